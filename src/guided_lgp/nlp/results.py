@@ -1,0 +1,96 @@
+"""What the two bounds of the NLP return.
+
+Conventions, everywhere: configurations ``q`` are the 14 arm joints in the order of
+``guided_lgp.scene.pr2.ARM_JOINTS`` (left arm, then right arm; rad). Poses are arrays
+``[x, y, z, qx, qy, qz, qw]`` of the box centre in the world (m). The world frame is the scene's:
+its origin on the floor under the robot's base.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from guided_lgp.logic import Skeleton
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Keyframe:
+    """A configuration x_k: arm joints (14,) in rad and the pose (7,) of every box."""
+
+    q: Array
+    boxes: Mapping[str, Array]
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why a bound gave up: the constraint that stays violated, and at which action."""
+
+    action: int
+    """Index of the action in the skeleton, from 0."""
+    constraint: str
+    """Name of the constraint, such as ``reach`` or ``collision l_forearm_link tab2``."""
+    violation: float
+    """By how much, in m or rad; NaN where there is no amount (a sampling planner gave up)."""
+    tried: str
+    """What was tried, in words."""
+
+    def __str__(self) -> str:
+        amount = "" if np.isnan(self.violation) else f" by {self.violation:.3g}"
+        return f"action {self.action + 1}: {self.constraint} violated{amount} ({self.tried})"
+
+
+@dataclass(frozen=True)
+class CoarseResult:
+    """P_coarse(a_1:K): one verified configuration per action (paper, eq. 3)."""
+
+    skeleton: Skeleton
+    feasible: bool
+    contacts: tuple[Keyframe, ...] = ()
+    """At each switch: the acting gripper is at the box (grasp) or still holds it (place)."""
+    retreated: tuple[Keyframe, ...] = ()
+    """After each action, when the acting arm has retreated: the configuration x_k of the policy."""
+    failure: Failure | None = None
+    tries: int = 1
+    """Starts of the solver that it took."""
+    time_s: float = field(default=0.0, compare=False)
+
+
+@dataclass(frozen=True)
+class Attachment:
+    """The box is rigid in the gripper's tool frame between two indices into ``times``."""
+
+    box: str
+    gripper: str
+    start: int
+    end: int
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """A dense, time-parameterised motion (paper, eq. 4)."""
+
+    joint_names: tuple[str, ...]
+    """Every joint that moves, the fingers included."""
+    times: Array
+    """(T,) s, strictly increasing."""
+    q: Array
+    """(T, len(joint_names)) rad, m for prismatic joints."""
+    attachments: tuple[Attachment, ...]
+
+
+@dataclass(frozen=True)
+class PathResult:
+    """P(a_1:K): the verified motion for the whole skeleton, or why there is none."""
+
+    skeleton: Skeleton
+    feasible: bool
+    trajectory: Trajectory | None = None
+    contacts: tuple[Keyframe, ...] = ()
+    failure: Failure | None = None
+    verification: Mapping[str, object] = field(default_factory=dict)
+    """Figures of the check in PyBullet: number of configurations, deepest penetration (m)."""
+    time_s: float = field(default=0.0, compare=False)

@@ -1,0 +1,122 @@
+"""The parameters of the pipeline: the model that validates ``params.yaml``."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from guided_lgp.errors import InputError
+
+Count = Annotated[int, Field(strict=True, ge=1, le=10_000_000)]
+Seed = Annotated[int, Field(strict=True, ge=0, lt=2**63)]
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Parallel(_Section):
+    """Fan-out inside a stage; results do not depend on it."""
+
+    backend: Literal["loky", "dask"]
+    workers: Annotated[int, Field(strict=True, ge=1, le=4096)]
+
+
+class BoundsParams(_Section):
+    """Limits of the NLP's two bounds."""
+
+    coarse_tries: Annotated[int, Field(strict=True, ge=1, le=1000)]
+    path_solutions: Annotated[int, Field(strict=True, ge=1, le=100)]
+
+
+class GenerateScenes(_Section):
+    """Configurations of the setups (paper, Table V)."""
+
+    training_configurations: Annotated[int, Field(strict=True, ge=1, le=1_000_000)]
+    test_configurations: Annotated[int, Field(strict=True, ge=1, le=1_000_000)]
+    scalability_configurations: Annotated[int, Field(strict=True, ge=1, le=1000)]
+    seed_training: Seed
+    seed_test: Seed
+    seed_scalability: Seed
+
+
+class EnumerateSequences(_Section):
+    """Exhaustive enumeration of feasible skeletons."""
+
+    max_length: Annotated[int, Field(strict=True, ge=1, le=10)]
+    slack: Annotated[int, Field(strict=True, ge=0, le=4)]
+
+
+class BuildDataset(_Section):
+    """Draw of the training objectives (paper, Table V)."""
+
+    training_objectives: Annotated[int, Field(strict=True, ge=1, le=72)]
+    seed: Seed
+
+
+class Network(_Section):
+    """Architecture and optimiser of one network (paper, Table IV)."""
+
+    layers: Annotated[int, Field(strict=True, ge=1, le=20)]
+    nodes: Annotated[int, Field(strict=True, ge=1, le=4096)]
+    dropout: Annotated[float, Field(ge=0, lt=1)]
+    l2: Annotated[float, Field(ge=0, le=1)]
+    epochs: Annotated[int, Field(strict=True, ge=1, le=100_000)]
+    batch: Annotated[int, Field(strict=True, ge=1, le=1_000_000)]
+    lr: Annotated[float, Field(gt=0, le=1)]
+
+
+class TrainPolicy(_Section):
+    """Training of the three networks (paper, Table IV)."""
+
+    seed: Seed
+    validation_share: Annotated[float, Field(gt=0, lt=1)]
+    patience: Count
+    instruction: Network
+    grasp: Network
+    place: Network
+
+
+class SearchLimits(_Section):
+    """Limits of the guided search (paper, Appendix)."""
+
+    max_depth: Annotated[int, Field(strict=True, ge=1, le=100)]
+    reattempts: Annotated[int, Field(strict=True, ge=0, le=1000)]
+    max_tree_size: Count
+
+
+class Params(_Section):
+    """All parameters; top keys are stage names."""
+
+    parallel: Parallel
+    bounds: BoundsParams
+    generate_scenes: GenerateScenes
+    enumerate_sequences: EnumerateSequences
+    build_dataset: BuildDataset
+    train_policy: TrainPolicy
+    evaluate_generalization: SearchLimits
+    compare_scalability: SearchLimits
+
+
+def load_params(path: Path = Path("params.yaml")) -> Params:
+    """Read and check the parameters.
+
+    Raises:
+        InputError: the file is missing, is not YAML, has an unknown key, a wrong type or an
+            impossible value; the message names the key and what is accepted.
+    """
+    try:
+        document = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(str(path), error.strerror or "cannot be read") from None
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise InputError(str(path), f"is not YAML: {' '.join(str(error).split())}") from None
+    try:
+        return Params.model_validate(document)
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = ".".join(str(part) for part in first["loc"])
+        fault = "unknown key" if first["type"] == "extra_forbidden" else first["msg"]
+        where = f"{path}: {key}" if key else str(path)
+        raise InputError(where, f"{fault} (got {first['input']!r})") from None

@@ -1,0 +1,31 @@
+"""What a planner needs of a policy: a probability over actions, as a protocol."""
+
+from collections.abc import Mapping, Sequence
+from typing import Protocol
+
+from guided_lgp.logic import Action, Objective, State
+from guided_lgp.nlp.results import Array
+
+
+class Policy(Protocol):
+    """A policy mu(g, s_k): log-probabilities of high-level actions (paper, Sec. II-A)."""
+
+    def log_probabilities(
+        self,
+        objective: Objective,
+        state: State,
+        positions: Mapping[str, Array],
+        actions: Sequence[Action],
+    ) -> Array:
+        """Score applicable actions.
+
+        Args:
+            objective: the goals to reach, as the search encodes them (adapted or not).
+            state: the symbolic state, for the choice of slots.
+            positions: world position (3,) in m of every symbol.
+            actions: the applicable children, at least one.
+
+        Returns:
+            (len(actions),) natural logarithms of the policy's probabilities.
+        """
+        ...
