@@ -8,5 +8,12 @@ class InputError(ValueError):
     """
 
     def __init__(self, where: str, fault: str, accepted: str = "") -> None:
-        message = f"{where}: {fault}"
-        super().__init__(f"{message} (accepted: {accepted})" if accepted else message)
+        super().__init__(where, fault, accepted)  # all of them, so that it survives pickling
+
+    def __str__(self) -> str:
+        where, fault, accepted = self.args
+        return f"{where}: {fault} (accepted: {accepted})" if accepted else f"{where}: {fault}"
+
+
+class WorkerError(RuntimeError):
+    """A task failed in a worker process; the message is one line, the cause has the traceback."""

@@ -1,0 +1,120 @@
+"""Fan-out: order, independence of the number of workers, errors, Dask."""
+
+import logging
+import os
+import pickle
+import sys
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from guided_lgp import parallel
+from guided_lgp.errors import InputError, WorkerError
+from guided_lgp.parallel import run, stream
+from guided_lgp.params import Parallel
+
+ONE = Parallel(backend="loky", workers=1)
+TWO = Parallel(backend="loky", workers=2)
+
+
+def square(number: int) -> int:
+    return number * number
+
+
+def slow_first(number: int) -> int:
+    time.sleep(0.3 if number == 0 else 0.0)
+    return number
+
+
+def blas_threads(_: int) -> str | None:
+    return os.environ.get("OMP_NUM_THREADS")
+
+
+def fail_at_two(number: int) -> int:
+    if number == 2:
+        raise ZeroDivisionError("no such number")
+    return number
+
+
+def bad_input(_: int) -> int:
+    raise InputError("scene.json: boxes.0", "floats 2 cm above tab1", "a box that stands")
+
+
+def die(_: int) -> int:
+    os._exit(1)
+
+
+@pytest.mark.parametrize("settings", [ONE, TWO])
+def test_results_come_in_the_order_of_the_tasks(settings: Parallel) -> None:
+    assert run(square, range(7), settings, "squares") == [0, 1, 4, 9, 16, 25, 36]
+    assert run(slow_first, range(5), settings, "sleep") == list(range(5))
+
+
+def test_no_tasks_no_results() -> None:
+    assert run(square, [], TWO, "nothing") == []
+
+
+def test_a_stream_can_be_left_early() -> None:
+    results: Iterator[int] = stream(square, range(100), TWO, "squares")
+    assert [next(results) for _ in range(3)] == [0, 1, 4]
+    results.close()  # type: ignore[attr-defined]
+    assert run(square, range(3), TWO, "squares") == [0, 1, 4]
+
+
+def test_each_worker_has_one_thread() -> None:
+    assert set(run(blas_threads, range(4), TWO, "threads")) == {"1"}
+
+
+@pytest.mark.parametrize("settings", [ONE, TWO])
+def test_a_failing_task_is_named_in_one_line(settings: Parallel) -> None:
+    with pytest.raises(WorkerError) as caught:
+        run(fail_at_two, range(4), settings, "enumerate")
+    expected = "enumerate: task 3 of 4 failed: ZeroDivisionError: no such number"
+    assert str(caught.value) == expected
+
+
+@pytest.mark.parametrize("settings", [ONE, TWO])
+def test_bad_input_stays_bad_input(settings: Parallel) -> None:
+    with pytest.raises(InputError, match=r"scene\.json: boxes\.0: floats 2 cm above tab1"):
+        run(bad_input, range(3), settings, "check")
+
+
+def test_input_errors_survive_pickling() -> None:
+    error = InputError("a.json", "is not JSON", "JSON")
+    assert str(pickle.loads(pickle.dumps(error))) == "a.json: is not JSON (accepted: JSON)"
+
+
+def test_a_killed_worker_is_reported() -> None:
+    with pytest.raises(WorkerError, match="a worker process was killed"):
+        run(die, range(2), TWO, "solve")
+
+
+def test_progress_in_a_pipe_is_a_line_per_milestone(caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.INFO, logger="guided_lgp"):
+        run(square, range(40), ONE, "squares")
+    lines = [record.getMessage() for record in caplog.records]
+    assert len(lines) == 10
+    assert lines[0].startswith("squares: 4/40")
+    assert lines[-1].startswith("squares: 40/40")
+
+
+def test_dask_gives_the_same_results(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("DASK_SCHEDULER_ADDRESS", raising=False)
+    settings = Parallel(backend="dask", workers=2)
+    assert run(square, range(7), settings, "squares") == run(square, range(7), TWO, "squares")
+    with pytest.raises(WorkerError, match="task 3 of 4 failed"):
+        run(fail_at_two, range(4), settings, "enumerate")
+
+
+def test_dask_without_its_extra_is_bad_input(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "dask.distributed", None)
+    with pytest.raises(InputError, match="dask is not installed"):
+        run(square, range(3), Parallel(backend="dask", workers=1), "squares")
+
+
+def test_an_unreachable_dask_scheduler_is_bad_input(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DASK_SCHEDULER_ADDRESS", "tcp://127.0.0.1:1")
+    monkeypatch.setattr(parallel, "SCHEDULER_TIMEOUT_S", 0.2)
+    with pytest.raises(InputError, match=r"no scheduler at tcp://127\.0\.0\.1:1"):
+        run(square, range(3), Parallel(backend="dask", workers=1), "squares")
