@@ -1,0 +1,74 @@
+"""Arithmetic of rigid poses ``[x, y, z, qx, qy, qz, qw]`` (m, unit quaternion).
+
+All functions broadcast over leading dimensions.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+IDENTITY: Array = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+
+
+def pose(position: ArrayLike, yaw: float = 0.0) -> Array:
+    """The pose of a level body at a position (3,), turned by ``yaw`` (rad) about the vertical."""
+    return np.array([*np.asarray(position, float), 0.0, 0.0, np.sin(yaw / 2), np.cos(yaw / 2)])
+
+
+def rotate(quaternion: Array, vector: Array) -> Array:
+    """Rotate vectors (..., 3) by unit quaternions (..., 4)."""
+    axis, scalar = quaternion[..., :3], quaternion[..., 3:]
+    twist = 2.0 * np.cross(axis, vector)
+    return np.asarray(vector + scalar * twist + np.cross(axis, twist))
+
+
+def multiply(first: Array, second: Array) -> Array:
+    """Product of quaternions (..., 4): apply ``second``, then ``first``."""
+    a, s = first[..., :3], first[..., 3:]
+    b, t = second[..., :3], second[..., 3:]
+    vector = s * b + t * a + np.cross(a, b)
+    scalar = s * t - np.sum(a * b, axis=-1, keepdims=True)
+    return np.concatenate([vector, scalar], axis=-1)
+
+
+def compose(first: Array, second: Array) -> Array:
+    """The pose ``first * second``: ``second`` is given in the frame of ``first``."""
+    position = first[..., :3] + rotate(first[..., 3:], second[..., :3])
+    return np.concatenate([position, multiply(first[..., 3:], second[..., 3:])], axis=-1)
+
+
+def inverse(transform: Array) -> Array:
+    """The inverse pose."""
+    conjugate = transform[..., 3:] * np.array([-1.0, -1.0, -1.0, 1.0])
+    return np.concatenate([-rotate(conjugate, transform[..., :3]), conjugate], axis=-1)
+
+
+def apply(transform: Array, points: Array) -> Array:
+    """World coordinates of points (..., 3) given in the frame of the pose (..., 7)."""
+    return transform[..., :3] + rotate(transform[..., 3:], points)
+
+
+def rotation_matrix(quaternion: Array) -> Array:
+    """Rotation matrices (..., 3, 3) of unit quaternions (..., 4); columns are the body's axes."""
+    return np.stack([rotate(quaternion, axis) for axis in np.eye(3)], axis=-1)
+
+
+def yaw_of(transform: Array) -> Array:
+    """Heading (rad) of the body's x axis, seen from above."""
+    x_axis = rotate(transform[..., 3:], np.array([1.0, 0.0, 0.0]))
+    return np.asarray(np.arctan2(x_axis[..., 1], x_axis[..., 0]))
+
+
+def tilt(transform: Array) -> Array:
+    """Angle (rad) between the body's z axis and the vertical."""
+    z_axis = rotate(transform[..., 3:], np.array([0.0, 0.0, 1.0]))
+    return np.asarray(np.arctan2(np.hypot(z_axis[..., 0], z_axis[..., 1]), z_axis[..., 2]))
+
+
+def angle_between(first: Array, second: Array) -> Array:
+    """Angle (rad) of the rotation between two poses."""
+    relative = multiply(inverse(first)[..., 3:], second[..., 3:])
+    return np.asarray(
+        2.0 * np.arctan2(np.linalg.norm(relative[..., :3], axis=-1), np.abs(relative[..., 3]))
+    )
