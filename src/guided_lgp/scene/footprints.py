@@ -1,0 +1,54 @@
+"""Footprints: the rectangles that boxes and tables cover, seen from above (m)."""
+
+import numpy as np
+
+from guided_lgp.scene.model import Box, Table
+from guided_lgp.scene.poses import Array
+
+_CORNERS = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
+
+
+def footprint(body: Box | Table) -> Array:
+    """Corners (4, 2) of a level body in the world, counter-clockwise."""
+    half = np.array(body.half_extents if isinstance(body, Table) else body.size[:2])
+    if isinstance(body, Box):
+        half = half / 2
+    return np.asarray(body.position[:2] + _CORNERS * half @ _turn(body.yaw).T)
+
+
+def gap(first: Array, second: Array) -> float:
+    """Distance of two convex footprints; negative is the depth of their overlap."""
+    separation = max(_separation(first, second), _separation(second, first))
+    if separation <= 0:
+        return separation
+    return min(_vertex_distance(first, second), _vertex_distance(second, first))
+
+
+def inset(support: Array, points: Array) -> Array:
+    """How far points (..., 2) lie inside a footprint (negative: outside)."""
+    normals, offsets = _edges(support)
+    return np.asarray(np.min(offsets - points @ normals.T, axis=-1))
+
+
+def _turn(yaw: float) -> Array:
+    return np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
+
+
+def _edges(corners: Array) -> tuple[Array, Array]:
+    edges = np.roll(corners, -1, axis=0) - corners
+    normals = np.stack([edges[:, 1], -edges[:, 0]], axis=1)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return normals, np.sum(normals * corners, axis=1)
+
+
+def _separation(first: Array, second: Array) -> float:
+    """The widest gap along the outward normals of the first footprint's edges."""
+    normals, offsets = _edges(first)
+    return float(np.max(np.min(second @ normals.T, axis=0) - offsets))
+
+
+def _vertex_distance(vertices: Array, polygon: Array) -> float:
+    start, step = polygon, np.roll(polygon, -1, axis=0) - polygon
+    offset = vertices[:, None] - start
+    along = np.clip(np.sum(offset * step, axis=2) / np.sum(step * step, axis=1), 0, 1)
+    return float(np.min(np.linalg.norm(offset - along[..., None] * step, axis=2)))

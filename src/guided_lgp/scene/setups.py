@@ -1,0 +1,60 @@
+"""The setups of the experiments: tables, trays, boxes and where they may start (paper, Fig. 4).
+
+The numbers are chosen so that every objective of setup a can be reached from nearly every
+configuration while a good part of the action sequences cannot be carried out (DESIGN §3).
+"""
+
+from dataclasses import dataclass
+
+from guided_lgp.scene.model import Robot, Table
+
+ROBOT = Robot(base=(0.0, 0.0, 0.0), torso=0.28)
+
+BOX_SIZE = (0.15, 0.07, 0.10)
+"""Extents (m). The fingers close across the 7 cm; 12 cm high boxes would not let two stand on one."""
+
+TAB1 = Table(name="tab1", position=(0.54, 0.33, 0.60), half_extents=(0.17, 0.20))
+TAB2 = Table(name="tab2", position=(0.54, -0.33, 0.60), half_extents=(0.17, 0.20))
+TRAY = Table(name="tray", position=(0.53, 0.0, 0.63), half_extents=(0.16, 0.11))
+"""3 cm above the tables, so that a box that overhangs the tray does not touch them."""
+
+CLEARANCE = 0.06
+"""Free space (m) that the open fingers need beside a box."""
+
+
+@dataclass(frozen=True)
+class Slot:
+    """A place where a box may start: table, and its centre (m) with the jitter added to it."""
+
+    table: str
+    x: float
+    y: float
+
+
+@dataclass(frozen=True)
+class Setup:
+    """Symbols and start positions of one setup.
+
+    With ``slots`` empty, boxes start anywhere on ``start_tables`` at any yaw, ``CLEARANCE``
+    apart; otherwise on distinct slots, their long side towards the robot.
+    """
+
+    tables: tuple[Table, ...]
+    boxes: tuple[str, ...]
+    start_tables: tuple[str, ...] = ()
+    slots: tuple[Slot, ...] = ()
+    jitter: float = 0.005
+    """Largest displacement from a slot along each axis (m)."""
+    yaw_jitter: float = 0.1
+    """Largest yaw on a slot (rad)."""
+
+
+_COLOURS = ("red", "green", "blue", "yellow", "purple")
+_SLOTS = tuple(Slot("tab1", x, y) for y in (0.19, 0.33, 0.47) for x in (0.455, 0.625))
+
+SETUPS: dict[str, Setup] = {
+    "a": Setup((TAB1, TAB2), _COLOURS[:3], start_tables=("tab1", "tab2")),
+    "b": Setup((TAB1, TAB2, TRAY), _COLOURS[:3], slots=_SLOTS),
+    "c": Setup((TAB1, TAB2, TRAY), _COLOURS[:4], slots=_SLOTS),
+    "d": Setup((TAB1, TAB2, TRAY), _COLOURS[:5], slots=_SLOTS),
+}
