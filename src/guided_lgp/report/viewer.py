@@ -1,0 +1,161 @@
+"""A scene in viser: the PR2 from its meshes, tables and boxes, each movable by name."""
+
+import io
+from collections.abc import Mapping
+from contextlib import redirect_stdout
+from typing import Any, Self
+
+import numpy as np
+import pinocchio
+import viser
+
+from guided_lgp.report.style import box_rgb
+from guided_lgp.scene.model import Scene
+from guided_lgp.scene.poses import Array, compose, pose
+from guided_lgp.scene.pr2 import (
+    ARM_JOINTS,
+    HOME_CONFIGURATION,
+    TOOL_LINK,
+    base_pose,
+    urdf_path,
+)
+
+_SHELL = (228, 228, 226)
+_HAND = (120, 124, 130)
+_TABLE = (206, 191, 168)
+_TRAY = (140, 142, 146)
+_THICKNESS = 0.02
+
+
+class Viewer:
+    """A viser server on the loopback interface that shows one scene.
+
+    The robot is a tree of frames, one per moving joint, so that a motion only sends the pose of
+    the joints that turn. Use it as a context manager: leaving it stops the server.
+    """
+
+    def __init__(self, scene: Scene, port: int = 8080) -> None:
+        """Start the server and draw the scene with both arms at their side.
+
+        Args:
+            scene: the scene to draw.
+            port: TCP port on 127.0.0.1; the next free one is taken if it is in use.
+        """
+        self.scene = scene
+        # viser announces itself on standard output, which belongs to our own results.
+        with redirect_stdout(io.StringIO()):
+            self.server = viser.ViserServer("127.0.0.1", port, scene.name, verbose=False)
+        self._model = pinocchio.buildModelFromUrdf(str(urdf_path()))
+        self._data = self._model.createData()
+        self._q = pinocchio.neutral(self._model)
+        self._joints: dict[str, Any] = {}
+        self._boxes: dict[str, Any] = {}
+        self._add_surroundings()
+        self._add_robot()
+        self._add_tables_and_boxes()
+        self.configure(dict(zip(ARM_JOINTS, HOME_CONFIGURATION.tolist(), strict=True)))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        with redirect_stdout(io.StringIO()):
+            self.server.stop()
+
+    def configure(self, joints: Mapping[str, float]) -> None:
+        """Move joints by name (rad, m where prismatic); the others stay."""
+        for name, value in joints.items():
+            joint = self._model.joints[self._model.getJointId(name)]
+            # pinocchio stores a continuous joint as the cosine and sine of its angle.
+            coordinates = value if joint.nq == 1 else (np.cos(value), np.sin(value))
+            self._q[joint.idx_q : joint.idx_q + joint.nq] = coordinates
+        pinocchio.forwardKinematics(self._model, self._data, self._q)
+        for name in joints:
+            local = self._data.liMi[self._model.getJointId(name)]
+            _move(self._joints[name], np.array(pinocchio.SE3ToXYZQUAT(local)))
+
+    def tool_pose(self, gripper: str) -> Array:
+        """Pose (7,) of the gripper's tool frame in the world, at the current configuration."""
+        frame = self._model.getFrameId(TOOL_LINK[gripper])
+        placement = pinocchio.updateFramePlacement(self._model, self._data, frame)
+        return compose(base_pose(self.scene), np.array(pinocchio.SE3ToXYZQUAT(placement)))
+
+    def move_box(self, name: str, box_pose: Array) -> None:
+        """Put a box at a pose (7,) in the world."""
+        _move(self._boxes[name], box_pose)
+
+    def _add_surroundings(self) -> None:
+        scene = self.server.scene
+        scene.set_up_direction("+z")
+        # viser's default surroundings are a picture that the browser would fetch.
+        scene.configure_environment_map(None)
+        scene.add_light_hemisphere(
+            "/light", sky_color=(255, 255, 255), ground_color=(200, 200, 195), intensity=1.5
+        )
+        scene.add_grid("/floor", 4.0, 4.0, cell_size=0.5, section_size=1.0)
+        camera = self.server.initial_camera
+        camera.position = (2.1, -0.8, 1.75)
+        camera.look_at = (0.35, 0.05, 0.7)
+        camera.fov = 0.7
+
+    def _add_robot(self) -> None:
+        scene = self.server.scene
+        scene.add_frame("/pr2", show_axes=False, **_pose(base_pose(self.scene)))
+        self._q[self._model.joints[self._model.getJointId("torso_lift_joint")].idx_q] = (
+            self.scene.robot.torso
+        )
+        pinocchio.forwardKinematics(self._model, self._data, self._q)
+        paths = ["/pr2"]
+        for index in range(1, self._model.njoints):
+            name = self._model.names[index]
+            paths.append(f"{paths[self._model.parents[index]]}/{name}")
+            local = np.array(pinocchio.SE3ToXYZQUAT(self._data.liMi[index]))
+            self._joints[name] = scene.add_frame(paths[index], show_axes=False, **_pose(local))
+        visuals = pinocchio.buildGeomFromUrdf(
+            self._model, str(urdf_path()), pinocchio.GeometryType.VISUAL
+        )
+        for visual in visuals.geometryObjects:
+            mesh = visual.geometry
+            # The primitive shapes of the description mark sensor frames, a few mm wide.
+            if not hasattr(mesh, "num_tris"):
+                continue
+            hand = "finger" in visual.name or "palm" in visual.name
+            scene.add_mesh_simple(
+                f"{paths[visual.parentJoint]}/{visual.name}",
+                np.asarray(mesh.vertices()),
+                np.array([[mesh.tri_indices(i)[k] for k in range(3)] for i in range(mesh.num_tris)]),
+                color=_HAND if hand else _SHELL,
+                flat_shading=True,
+                **_pose(np.array(pinocchio.SE3ToXYZQUAT(visual.placement))),
+            )
+
+    def _add_tables_and_boxes(self) -> None:
+        scene = self.server.scene
+        for table in self.scene.tables:
+            x, y, top = table.position
+            scene.add_box(
+                f"/tables/{table.name}",
+                _TRAY if table.name == "tray" else _TABLE,
+                (2 * table.half_extents[0], 2 * table.half_extents[1], _THICKNESS),
+                cast_shadow=False,
+                **_pose(pose((x, y, top - _THICKNESS / 2), table.yaw)),
+            )
+        for box in self.scene.boxes:
+            self._boxes[box.name] = scene.add_box(
+                f"/boxes/{box.name}",
+                box_rgb(box.name),
+                box.size,
+                **_pose(pose(box.position, box.yaw)),
+            )
+
+
+def _pose(transform: Array) -> dict[str, Array]:
+    """The arguments by which viser takes a pose (7,)."""
+    return {"position": transform[:3], "wxyz": transform[[6, 3, 4, 5]]}
+
+
+def _move(node: Any, transform: Array) -> None:
+    """Set a node's pose, sending only what changed."""
+    for attribute, value in _pose(transform).items():
+        if not np.allclose(getattr(node, attribute), value, rtol=0.0, atol=1e-5):
+            setattr(node, attribute, value)
