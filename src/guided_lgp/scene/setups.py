@@ -11,7 +11,7 @@ from guided_lgp.scene.model import Robot, Table
 ROBOT = Robot(base=(0.0, 0.0, 0.0), torso=0.28)
 
 BOX_SIZE = (0.15, 0.07, 0.10)
-"""Extents (m). The fingers close across the 7 cm; 12 cm high boxes would not let two stand on one."""
+"""Extents (m). The fingers close across the 7 cm; on a 12 cm high box no two others could stand."""
 
 TAB1 = Table(name="tab1", position=(0.54, 0.33, 0.60), half_extents=(0.17, 0.20))
 TAB2 = Table(name="tab2", position=(0.54, -0.33, 0.60), half_extents=(0.17, 0.20))

@@ -1,0 +1,319 @@
+"""The scene in PyBullet: the judge of collisions, and the camera."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from itertools import combinations
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+import pybullet
+from numpy.typing import NDArray
+
+from guided_lgp.scene import pr2
+from guided_lgp.scene.model import GRIPPERS, Scene, Table
+from guided_lgp.scene.poses import Array, pose
+
+TABLE_THICKNESS = 0.04
+"""Tables and trays are slabs (m) under their top; what holds them up is left out."""
+
+MARGIN = 0.005
+"""Deepest penetration (m) that passes: hulls are wider than the meshes they enclose."""
+
+COLOURS: dict[str, tuple[float, float, float]] = {
+    "red": (0.80, 0.16, 0.14),
+    "green": (0.20, 0.62, 0.24),
+    "blue": (0.13, 0.34, 0.75),
+    "yellow": (0.95, 0.78, 0.15),
+    "purple": (0.53, 0.27, 0.66),
+    "orange": (0.95, 0.52, 0.12),
+    "white": (0.92, 0.92, 0.92),
+    "black": (0.15, 0.15, 0.15),
+    "tray": (0.45, 0.45, 0.47),
+}
+"""Colour of a body named after it; RGB in 0..1."""
+
+_OTHER_BOX, _OTHER_TABLE = (0.25, 0.65, 0.68), (0.78, 0.66, 0.50)
+_LEGS, _FLOOR = (0.45, 0.42, 0.40), (0.93, 0.94, 0.95)
+_BOX_DENSITY = 400.0
+_FRICTION = 0.8
+
+
+@dataclass(frozen=True, order=True)
+class Penetration:
+    """Two bodies (links, boxes or tables, by name) that overlap by ``depth`` (m)."""
+
+    first: str
+    second: str
+    depth: float
+
+    @property
+    def bodies(self) -> frozenset[str]:
+        """The two names."""
+        return frozenset((self.first, self.second))
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A camera that looks from ``eye`` to ``target`` (m, world); angle of view in degrees."""
+
+    eye: tuple[float, float, float] = (2.5, 1.1, 1.75)
+    target: tuple[float, float, float] = (0.25, 0.0, 0.74)
+    view: float = 38.0
+    width: int = 960
+    height: int = 720
+
+
+class World:
+    """A scene loaded into a PyBullet client of its own (no window).
+
+    Robot links are the convex hulls of the meshes, as PyBullet loads them. Self-collision pairs
+    that the SRDF disables and pairs of bodies that never move are not looked at. Use it as a
+    context manager, or call :meth:`close`.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.client = pybullet.connect(pybullet.DIRECT)
+        base = pr2.base_pose(scene)
+        self.robot: int = pybullet.loadURDF(
+            str(pr2.urdf_path()),
+            basePosition=base[:3],
+            baseOrientation=base[3:],
+            useFixedBase=True,
+            flags=pybullet.URDF_USE_SELF_COLLISION,
+            physicsClientId=self.client,
+        )
+        self.joints: dict[str, int] = {}
+        self.links: dict[str, int] = {}
+        for index in range(pybullet.getNumJoints(self.robot, physicsClientId=self.client)):
+            info = pybullet.getJointInfo(self.robot, index, physicsClientId=self.client)
+            self.joints[info[1].decode()] = index
+            self.links[info[12].decode()] = index
+        self._moved = [
+            self.joints[joint]
+            for joint in (*pr2.ARM_JOINTS, *(j for g in GRIPPERS for j in pr2.FINGER_JOINTS[g]))
+        ]
+        pybullet.resetJointState(
+            self.robot,
+            self.joints["torso_lift_joint"],
+            scene.robot.torso,
+            physicsClientId=self.client,
+        )
+        self.tables = {table.name: self._add_table(table) for table in scene.tables}
+        self.boxes = {box.name: self._add_box(box.name, box.size) for box in scene.boxes}
+        self._names: dict[tuple[int, int], str] = {
+            (self.robot, index): link for link, index in self.links.items()
+        }
+        self._names |= {(body, -1): n for n, body in (self.tables | self.boxes).items()}
+        self._parts = {name: part for part, name in self._names.items()}
+        self._filter_pairs()
+        self._dressed = False
+        self.set(pr2.HOME_CONFIGURATION, initial_poses(scene))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Free the client; the world cannot be used afterwards."""
+        if self.client >= 0:
+            pybullet.disconnect(physicsClientId=self.client)
+            self.client = -1
+
+    def set(
+        self, q: Array, boxes: Mapping[str, Array], fingers: Mapping[str, float] | None = None
+    ) -> None:
+        """Put the robot and the boxes somewhere, without simulation.
+
+        Args:
+            q: configuration (14,) in rad.
+            boxes: pose (7,) of each box that is to be moved.
+            fingers: value (rad) of the finger joints by gripper; open where not given.
+        """
+        fingers = fingers or {}
+        values = [[value] for value in np.asarray(q, float).tolist()]
+        for gripper in GRIPPERS:
+            values += 4 * [[float(fingers.get(gripper, pr2.FINGER_LIMITS[1]))]]
+        pybullet.resetJointStatesMultiDof(
+            self.robot, self._moved, values, physicsClientId=self.client
+        )
+        for name, placement in boxes.items():
+            pybullet.resetBasePositionAndOrientation(
+                self.boxes[name], placement[:3], placement[3:], physicsClientId=self.client
+            )
+
+    def penetrations(self, margin: float = MARGIN) -> list[Penetration]:
+        """Pairs of bodies that overlap by more than ``margin`` (m), deepest first.
+
+        Every contact the collision detection reports is measured again from scratch, as its
+        cached contact points depend on what was asked before.
+        """
+        pybullet.performCollisionDetection(physicsClientId=self.client)
+        suspects = {
+            ((contact[1], contact[3]), (contact[2], contact[4]))
+            for contact in pybullet.getContactPoints(physicsClientId=self.client)
+            if contact[8] < 0
+        }
+        found = []
+        for first, second in suspects:
+            depth = -self._distance(first, second)
+            if depth > margin:
+                names = sorted((self._names[first], self._names[second]))
+                found.append(Penetration(names[0], names[1], depth))
+        return sorted(set(found), key=lambda overlap: (-overlap.depth, overlap.first))
+
+    def distance(self, first: str, second: str, limit: float = 1.0) -> float:
+        """Distance (m) of two bodies by name, negative if they overlap; ``limit`` if farther."""
+        return self._distance(self._parts[first], self._parts[second], limit)
+
+    def link_poses(self, links: Iterable[str]) -> Array:
+        """Poses (n, 7) of link frames in the world."""
+        indices = [self.links[link] for link in links]
+        states = pybullet.getLinkStates(
+            self.robot, indices, computeForwardKinematics=True, physicsClientId=self.client
+        )
+        return np.array([[*state[4], *state[5]] for state in states])
+
+    def render(self, camera: Camera | None = None) -> NDArray[np.uint8]:
+        """A picture (height, width, 3) of the world as it is, drawn without a graphics card."""
+        camera = camera or Camera()
+        if not self._dressed:
+            self._dress()
+        view = pybullet.computeViewMatrix(camera.eye, camera.target, (0, 0, 1))
+        projection = pybullet.computeProjectionMatrixFOV(
+            camera.view, camera.width / camera.height, 0.1, 20.0
+        )
+        image = pybullet.getCameraImage(
+            camera.width,
+            camera.height,
+            view,
+            projection,
+            lightDirection=(1.6, 0.9, 3.0),
+            lightColor=(1, 1, 1),
+            lightAmbientCoeff=0.55,
+            lightDiffuseCoeff=0.5,
+            lightSpecularCoeff=0.05,
+            shadow=True,
+            renderer=pybullet.ER_TINY_RENDERER,
+            physicsClientId=self.client,
+        )
+        pixels = np.reshape(image[2], (camera.height, camera.width, 4)).astype(np.uint8)
+        return pixels[:, :, :3]
+
+    def _distance(
+        self, first: tuple[int, int], second: tuple[int, int], limit: float = 0.0
+    ) -> float:
+        points = pybullet.getClosestPoints(
+            first[0],
+            second[0],
+            limit,
+            first[1],
+            second[1],
+            physicsClientId=self.client,
+        )
+        return min((float(point[8]) for point in points), default=limit)
+
+    def _add_table(self, table: Table) -> int:
+        half = (*table.half_extents, TABLE_THICKNESS / 2)
+        x, y, z = table.position
+        placement = pose((x, y, z - TABLE_THICKNESS / 2), table.yaw)
+        colour = COLOURS.get(table.name, _OTHER_TABLE)
+        return self._add_body(0.0, half, placement, colour)
+
+    def _add_box(self, name: str, size: tuple[float, float, float]) -> int:
+        half = (size[0] / 2, size[1] / 2, size[2] / 2)
+        mass = _BOX_DENSITY * float(np.prod(size))
+        return self._add_body(mass, half, pose((0, 0, 0)), COLOURS.get(name, _OTHER_BOX))
+
+    def _add_body(
+        self,
+        mass: float,
+        half: tuple[float, float, float],
+        placement: Array,
+        colour: tuple[float, float, float],
+    ) -> int:
+        shape = pybullet.createCollisionShape(
+            pybullet.GEOM_BOX, halfExtents=half, physicsClientId=self.client
+        )
+        looks = pybullet.createVisualShape(
+            pybullet.GEOM_BOX,
+            halfExtents=half,
+            rgbaColor=(*colour, 1.0),
+            specularColor=(0.1, 0.1, 0.1),
+            physicsClientId=self.client,
+        )
+        body: int = pybullet.createMultiBody(
+            mass,
+            shape,
+            looks,
+            placement[:3],
+            placement[3:],
+            physicsClientId=self.client,
+        )
+        pybullet.changeDynamics(body, -1, lateralFriction=_FRICTION, physicsClientId=self.client)
+        return body
+
+    def _dress(self) -> None:
+        """Colour the robot, put legs under the tables and a floor under it all: looks only."""
+        for link, index in self.links.items():
+            dark = any(part in link for part in ("finger", "wrist", "elbow", "head", "laser"))
+            colour = (0.32, 0.33, 0.36, 1.0) if dark else (0.84, 0.84, 0.82, 1.0)
+            pybullet.changeVisualShape(
+                self.robot, index, textureUniqueId=-1, rgbaColor=colour, physicsClientId=self.client
+            )
+        self._add_decoration((3.0, 3.0, 0.005), (0.5, 0.0, -0.005), _FLOOR)
+        for table in self.scene.tables:
+            x, y, z = table.position
+            height = (z - TABLE_THICKNESS) / 2
+            self._add_decoration((0.03, 0.03, height), (x, y, height), _LEGS)
+            self._add_decoration((0.14, 0.10, 0.01), (x, y, 0.01), _LEGS)
+        self._dressed = True
+
+    def _add_decoration(
+        self,
+        half: tuple[float, float, float],
+        position: tuple[float, float, float],
+        colour: tuple[float, float, float],
+    ) -> None:
+        looks = pybullet.createVisualShape(
+            pybullet.GEOM_BOX,
+            halfExtents=half,
+            rgbaColor=(*colour, 1.0),
+            specularColor=(0, 0, 0),
+            physicsClientId=self.client,
+        )
+        pybullet.createMultiBody(0.0, -1, looks, position, physicsClientId=self.client)
+
+    def _filter_pairs(self) -> None:
+        """Switch off the pairs that the SRDF disables and those of bodies that never move."""
+        arms = {link for g in GRIPPERS for link in (*pr2.ARM_LINKS[g], *pr2.HAND_LINKS[g])}
+        solid = [
+            link
+            for link, index in self.links.items()
+            if pybullet.getCollisionShapeData(self.robot, index, physicsClientId=self.client)
+        ]
+        disabled = pr2.disabled_pairs()
+        for one, other in combinations(solid, 2):
+            if not {one, other} & arms or frozenset((one, other)) in disabled:
+                self._ignore(self._parts[one], self._parts[other])
+        for table in self.tables.values():
+            for link in set(solid) - arms:
+                self._ignore(self._parts[link], (table, -1))
+
+    def _ignore(self, first: tuple[int, int], second: tuple[int, int]) -> None:
+        pybullet.setCollisionFilterPair(
+            first[0], second[0], first[1], second[1], 0, physicsClientId=self.client
+        )
+
+
+def initial_poses(scene: Scene) -> dict[str, Array]:
+    """Pose (7,) of every box at the start."""
+    return {box.name: pose(box.position, box.yaw) for box in scene.boxes}
