@@ -115,8 +115,27 @@ def load_params(path: Path = Path("params.yaml")) -> Params:
     try:
         return Params.model_validate(document)
     except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(str(part) for part in first["loc"])
-        fault = "unknown key" if first["type"] == "extra_forbidden" else first["msg"]
-        where = f"{path}: {key}" if key else str(path)
-        raise InputError(where, f"{fault} (got {first['input']!r})") from None
+        raise _input_error(path, error) from None
+
+
+def _input_error(path: Path, error: ValidationError) -> InputError:
+    first = error.errors()[0]
+    keys = [str(part) for part in first["loc"]]
+    where = f"{path}: {'.'.join(keys)}" if keys else str(path)
+    match first["type"]:
+        case "extra_forbidden":
+            return InputError(where, "unknown key", ", ".join(_accepted_keys(keys[:-1])))
+        case "missing":
+            return InputError(where, "missing")
+        case "model_type":
+            return InputError(where, "is not a mapping", ", ".join(_accepted_keys(keys)))
+    return InputError(where, f"{first['msg'].lower()}, not {first['input']!r}")
+
+
+def _accepted_keys(section: list[str]) -> list[str]:
+    model: type[BaseModel] = Params
+    for key in section:
+        nested = model.model_fields[key].annotation
+        assert isinstance(nested, type)
+        model = nested
+    return list(model.model_fields)

@@ -1,0 +1,42 @@
+# One command each, from a fresh clone: `make repro` computes the tables, `make test` checks the code.
+
+PYTHON ?= python3.11
+VENV := .venv
+BIN := $(CURDIR)/$(VENV)/bin
+INSTALLED := $(VENV)/.installed
+
+export PATH := $(BIN):$(PATH)
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+
+.PHONY: setup repro test lint bench mlflow
+
+setup: $(INSTALLED)
+
+$(VENV)/bin/pip:
+	$(PYTHON) -m venv $(VENV)
+
+$(INSTALLED): requirements.lock pyproject.toml | $(VENV)/bin/pip
+	$(BIN)/pip install --quiet -r requirements.lock
+	$(BIN)/pip install --quiet --no-deps -e .
+	touch $@
+
+# DVC wants a Git repository; an unpacked archive of the sources has none.
+repro: setup
+	git rev-parse --git-dir > /dev/null 2>&1 || dvc config --local core.no_scm true
+	dvc repro
+	guided-lgp mlflow sync
+
+test: lint
+	pytest -n auto
+
+lint: setup
+	ruff format --check .
+	ruff check .
+	mypy
+	lint-imports
+
+bench: setup
+	guided-lgp bench
+
+mlflow: setup
+	guided-lgp mlflow ui

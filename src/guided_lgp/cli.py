@@ -1,0 +1,121 @@
+"""The command line: the stages of the pipeline, planning, viewing, tracking.
+
+Exit codes: 0 solved or done; 1 no plan found, or a check failed; 2 bad input; 3 an error of the
+program itself. Heavy packages are imported by the commands that use them.
+"""
+
+import json
+import logging
+import os
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Annotated
+
+import typer
+from typer.exceptions import TyperException
+
+from guided_lgp.errors import InputError, WorkerError
+
+app = typer.Typer(
+    name="guided-lgp",
+    help="Guided sequential manipulation planning with a hierarchical policy.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+)
+mlflow_app = typer.Typer(help="The MLflow dashboard of pipeline runs.", no_args_is_help=True)
+app.add_typer(mlflow_app, name="mlflow")
+
+AsJson = Annotated[bool, typer.Option("--json", help="Write JSON to standard output.")]
+
+
+@app.callback()
+def _options(
+    debug: Annotated[
+        bool, typer.Option("--debug", help="Show the traceback of an error; before any command.")
+    ] = False,
+) -> None:
+    logging.getLogger("guided_lgp").setLevel(logging.DEBUG if debug else logging.INFO)
+
+
+@app.command()
+def doctor(as_json: AsJson = False) -> None:
+    """Check the installation and say how to mend what is missing.
+
+    Example: guided-lgp doctor
+    """
+    from guided_lgp.doctor import examine
+
+    findings = examine()
+    if as_json:
+        typer.echo(json.dumps([asdict(finding) for finding in findings], indent=1))
+    else:
+        for finding in findings:
+            typer.echo(f"{'ok  ' if finding.ok else 'FAIL'}  {finding.name}: {finding.detail}")
+            if finding.mend:
+                typer.echo(f"      {finding.mend}")
+    if not all(finding.ok for finding in findings):
+        raise typer.Exit(1)
+
+
+@mlflow_app.command("ui")
+def mlflow_ui(
+    port: Annotated[int, typer.Option(help="TCP port on 127.0.0.1.", min=1, max=65535)] = 5000,
+) -> None:
+    """Open the dashboard on http://127.0.0.1:PORT until interrupted.
+
+    Example: guided-lgp mlflow ui --port 5001
+    """
+    from guided_lgp import tracking
+
+    tracking.prepare()
+    typer.echo(f"MLflow: http://127.0.0.1:{port} (Ctrl-C ends it)")
+    command = [sys.executable, "-m", "mlflow", "server", "--host", "127.0.0.1"]
+    command += ["--port", str(port), "--backend-store-uri", tracking.tracking_uri()]
+    os.execv(sys.executable, command)
+
+
+@mlflow_app.command("sync")
+def mlflow_sync() -> None:
+    """Record the stages that DVC restored from its cache; what is recorded already stays as it is.
+
+    Example: dvc exp apply EXPERIMENT, then: guided-lgp mlflow sync
+    """
+    from guided_lgp import tracking
+    from guided_lgp.params import load_params
+
+    now, before = tracking.sync(load_params())
+    typer.echo(f"recorded {len(now)} stages {' '.join(now)}".strip())
+    typer.echo(f"already recorded: {len(before)}")
+
+
+def stage_main(stage: str) -> None:
+    """Entry point of the scripts in ``stages/``: run one stage as the command line does."""
+    main([stage, *sys.argv[1:]])
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run a command; every error becomes one line on standard error and an exit code."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    debug = "--debug" in words
+    words = [word for word in words if word != "--debug"]
+    logging.basicConfig(format="%(message)s", level=logging.WARNING)
+    try:
+        code = app(["--debug", *words] if debug else words, standalone_mode=False)
+    except (InputError, TyperException) as error:
+        _fail(error, 2, debug)
+    except KeyboardInterrupt:
+        sys.exit(130)
+    except Exception as error:
+        _fail(error, 3, debug)
+    sys.exit(code)
+
+
+def _fail(error: Exception, code: int, debug: bool) -> None:
+    if debug:
+        raise error
+    text = error.format_message() if isinstance(error, TyperException) else str(error)
+    internal = code == 3 and not isinstance(error, WorkerError)
+    prefix = f"internal error: {type(error).__name__}: " if internal else "error: "
+    typer.echo(prefix + " ".join(text.split()), err=True)
+    sys.exit(code)

@@ -1,0 +1,350 @@
+"""MLflow: one parent run per pipeline execution, one child per stage (DESIGN §7).
+
+A stage records itself when it has finished, from the files it has written. What DVC restores from
+its cache is recorded by :func:`sync` from the same files. Every child carries a key made of all
+that determines the stage's results, so what has been recorded is not recorded again. Results never
+depend on tracking: its failures become a warning.
+"""
+
+import json
+import logging
+import math
+import os
+import subprocess
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from hashlib import md5, sha256
+from pathlib import Path
+from typing import Any, TypeVar
+
+import yaml
+
+from guided_lgp.errors import InputError
+from guided_lgp.params import Params
+
+Value = TypeVar("Value")
+
+EXPERIMENT = "guided-lgp"
+STAGE_TAG = "guided_lgp.stage"
+KEY_TAG = "guided_lgp.key"
+EXECUTION_TAG = "guided_lgp.execution"
+STATE_TAG = "guided_lgp.state"
+BATCH = 500
+"""Metrics per request; MLflow accepts at most 1000."""
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class StageFiles:
+    """A stage as ``dvc.lock`` describes it."""
+
+    address: str
+    """Name in dvc.yaml, such as ``train_policy@place``."""
+    key: str
+    """Hash of the command, the dependencies and the parameters."""
+    dependencies: tuple[str, ...]
+    outputs: Mapping[str, str | None]
+    """Paths with their md5, where known."""
+
+    @classmethod
+    def of(cls, address: str, entry: Mapping[str, Any]) -> "StageFiles":
+        """Read the entry of one stage in ``dvc.lock``."""
+        dependencies = {item["path"]: item.get("md5") for item in entry.get("deps", ())}
+        determinants = [address, entry["cmd"], dependencies, entry.get("params", {})]
+        text = json.dumps(determinants, sort_keys=True)
+        return cls(
+            address=address,
+            key=sha256(text.encode()).hexdigest(),
+            dependencies=tuple(sorted(dependencies)),
+            outputs={item["path"]: item.get("md5") for item in entry.get("outs", ())},
+        )
+
+
+def repository() -> Path:
+    """The clone that the working directory belongs to; of a temporary experiment, its origin."""
+    if root := os.environ.get("DVC_ROOT"):
+        return Path(root)
+    here = Path.cwd()
+    clones = (folder for folder in (here, *here.parents) if (folder / "dvc.yaml").is_file())
+    return next((folder for folder in clones if ".dvc" not in folder.parts), here)
+
+
+def tracking_uri() -> str:
+    """Where runs are recorded: ``MLFLOW_TRACKING_URI``, or the database of the clone."""
+    return os.environ.get("MLFLOW_TRACKING_URI") or f"sqlite:///{repository() / 'mlflow.db'}"
+
+
+def prepare() -> Any:
+    """Create the database and the experiment, once and before any worker starts.
+
+    Returns:
+        An ``mlflow.MlflowClient``.
+    """
+    for noisy in ("alembic", "mlflow"):
+        logging.getLogger(noisy).setLevel(logging.ERROR)
+    import mlflow
+
+    uri = tracking_uri()
+    mlflow.set_tracking_uri(uri)
+    client = mlflow.MlflowClient(uri)
+    if client.get_experiment_by_name(EXPERIMENT) is None:
+        local = uri.startswith("sqlite:///")
+        folder = Path(uri.removeprefix("sqlite:///")).resolve().parent / "mlruns"
+        client.create_experiment(EXPERIMENT, folder.as_uri() if local else None)
+    return client
+
+
+@contextmanager
+def recorded(address: str, params: Params) -> Iterator[None]:
+    """Record a stage as a run; its own errors pass through, those of tracking do not."""
+    run = _attempt(lambda: _Run.start(address, params, _execution(), replayed=False))
+    try:
+        yield
+    except BaseException as error:
+        if run is not None:
+            reason = f"{type(error).__name__}: {error}"
+            _attempt(lambda: run.fail(reason))
+        raise
+    if run is not None:
+        _attempt(lambda: run.finish(_running_stage(address)))
+
+
+def sync(params: Params) -> tuple[list[str], list[str]]:
+    """Record the stages in ``dvc.lock`` that no run describes yet.
+
+    Returns:
+        The stages recorded now, and those that had been recorded before.
+
+    Raises:
+        InputError: there is no ``dvc.lock``, or an output is not the one that it names.
+    """
+    lock = Path("dvc.lock")
+    if not lock.is_file():
+        raise InputError("dvc.lock", "not found: no stage has run here", "dvc repro first")
+    document = yaml.safe_load(lock.read_text(encoding="utf-8"))
+    stages = [StageFiles.of(address, entry) for address, entry in document["stages"].items()]
+    known = _recorded_keys(prepare())
+    missing = [stage for stage in stages if stage.key not in known]
+    for stage in missing:
+        _check_outputs(stage)
+    for stage in missing:
+        run = _Run.start(stage.address, params, _execution_of_same_state(params), replayed=True)
+        run.finish(stage)
+    before = [stage.address for stage in stages if stage.key in known]
+    return [stage.address for stage in missing], before
+
+
+class _Run:
+    """The child run of one stage, and its parent."""
+
+    def __init__(self, client: Any, parent: str, run_id: str) -> None:
+        self._client = client
+        self._parent = parent
+        self._id = run_id
+
+    @classmethod
+    def start(cls, address: str, params: Params, execution: str, replayed: bool) -> "_Run":
+        from mlflow.utils.mlflow_tags import MLFLOW_PARENT_RUN_ID
+
+        client = prepare()
+        experiment = client.get_experiment_by_name(EXPERIMENT).experiment_id
+        parent = _find(client, f"tags.`{EXECUTION_TAG}` = '{execution}'")
+        if parent is None:
+            parent = _create_parent(client, experiment, params, execution)
+        client.update_run(parent, status="RUNNING")
+        tags = {MLFLOW_PARENT_RUN_ID: parent, STAGE_TAG: address, "restored": str(replayed)}
+        child = client.create_run(experiment, tags=tags, run_name=address)
+        run = cls(client, parent, child.info.run_id)
+        section = address.partition("@")[0]
+        run._log_params(getattr(params, section).model_dump())
+        return run
+
+    def finish(self, stage: StageFiles) -> None:
+        """Record what the stage has written."""
+        self._client.set_tag(self._id, KEY_TAG, stage.key)
+        outputs = [Path(path) for path in stage.outputs]
+        reports = [file for path in outputs if path.parts[0] == "reports" for file in _files(path)]
+        for file in reports:
+            if file.suffix == ".json":
+                _log_metrics(self._client, self._id, _read_metrics(file))
+            self._client.log_artifact(self._id, str(file), str(file.parent.relative_to("reports")))
+        read = [file for path in stage.dependencies for file in _files(Path(path))]
+        for file in [*read, *reports]:
+            if file.parts[0] == "reports" and file.suffix == ".json":
+                scalars = {name: [values[-1]] for name, values in _read_metrics(file).items()}
+                prefixed = {f"{file.stem}.{name}": values for name, values in scalars.items()}
+                _log_metrics(self._client, self._parent, prefixed)
+        self._end("FINISHED")
+
+    def fail(self, reason: str) -> None:
+        """Record why the stage has no results."""
+        self._client.set_tag(self._id, "error", reason[:5000])
+        self._end("FAILED")
+
+    def _end(self, status: str) -> None:
+        self._client.set_terminated(self._id, status)
+        self._client.set_terminated(self._parent, status)
+
+    def _log_params(self, values: Mapping[str, Any]) -> None:
+        _log_params(self._client, self._id, values)
+
+
+def _create_parent(client: Any, experiment: str, params: Params, execution: str) -> str:
+    values = params.model_dump()
+    name = os.environ.get("DVC_EXP_NAME") or time.strftime("repro %Y-%m-%d %H:%M:%S")
+    tags = {
+        EXECUTION_TAG: execution,
+        STATE_TAG: _state(params),
+        "commit": _commit(),
+        "dvc_experiment": os.environ.get("DVC_EXP_NAME", ""),
+    }
+    run_id: str = client.create_run(experiment, tags=tags, run_name=name).info.run_id
+    _log_params(client, run_id, values)
+    return run_id
+
+
+def _log_params(client: Any, run_id: str, values: Mapping[str, Any]) -> None:
+    from mlflow.entities import Param
+
+    flat = [Param(name, str(value)) for name, value in flatten(values).items()]
+    client.log_batch(run_id, params=flat)
+
+
+def _log_metrics(client: Any, run_id: str, metrics: Mapping[str, list[float]]) -> None:
+    from mlflow.entities import Metric
+
+    now = int(time.time() * 1000)
+    points = [
+        Metric(name, value, now, step)
+        for name, values in metrics.items()
+        for step, value in enumerate(values)
+    ]
+    for first in range(0, len(points), BATCH):
+        client.log_batch(run_id, metrics=points[first : first + BATCH])
+
+
+def flatten(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Nested mappings as one level, with dotted names."""
+    flat: dict[str, Any] = {}
+    for name, value in values.items():
+        if isinstance(value, Mapping):
+            flat |= flatten(value, f"{prefix}{name}.")
+        else:
+            flat[f"{prefix}{name}"] = value
+    return flat
+
+
+def _read_metrics(file: Path) -> dict[str, list[float]]:
+    """The numbers of a JSON file by dotted name; a list of numbers is a curve over epochs."""
+    document = json.loads(file.read_text(encoding="utf-8"))
+    metrics = {}
+    for name, value in flatten(document if isinstance(document, dict) else {}).items():
+        values = value if isinstance(value, list) else [value]
+        if values and all(_is_number(item) for item in values):
+            metrics[name] = [float(item) for item in values]
+    return metrics
+
+
+def _is_number(value: object) -> bool:
+    return (
+        isinstance(value, int | float)
+        and not isinstance(value, bool)
+        and math.isfinite(float(value))
+    )
+
+
+def _files(path: Path) -> list[Path]:
+    if path.is_dir():
+        return sorted(file for file in path.rglob("*") if file.is_file())
+    return [path] if path.is_file() else []
+
+
+def _find(client: Any, condition: str) -> str | None:
+    experiment = client.get_experiment_by_name(EXPERIMENT).experiment_id
+    runs = client.search_runs([experiment], condition, max_results=1)
+    return runs[0].info.run_id if runs else None
+
+
+def _recorded_keys(client: Any) -> set[str]:
+    experiment = client.get_experiment_by_name(EXPERIMENT).experiment_id
+    keys: set[str] = set()
+    token = None
+    while True:
+        page = client.search_runs(
+            [experiment], f"tags.`{KEY_TAG}` != '' and status = 'FINISHED'", page_token=token
+        )
+        keys.update(run.data.tags[KEY_TAG] for run in page)
+        token = page.token
+        if not token:
+            return keys
+
+
+def _execution() -> str:
+    """Identity of the pipeline execution that this process belongs to.
+
+    DVC starts every stage from one process, so that process identifies the execution; a stage
+    started by hand is an execution of its own.
+    """
+    import psutil
+
+    this = psutil.Process()
+    ancestors = [
+        process
+        for process in this.parents()
+        if any(Path(word).name == "dvc" for word in process.cmdline()[:3])
+    ]
+    root = ancestors[0] if ancestors else this
+    return f"{os.environ.get('DVC_EXP_NAME', '')}:{root.pid}:{root.create_time():.2f}"
+
+
+def _execution_of_same_state(params: Params) -> str:
+    """The latest execution of this commit with these parameters, or a new one."""
+    client = prepare()
+    run_id = _find(client, f"tags.`{STATE_TAG}` = '{_state(params)}'")
+    if run_id is None:
+        return f"sync:{_state(params)}"
+    return str(client.get_run(run_id).data.tags[EXECUTION_TAG])
+
+
+def _state(params: Params) -> str:
+    return sha256(f"{_commit()} {params.model_dump_json()}".encode()).hexdigest()
+
+
+def _commit() -> str:
+    if revision := os.environ.get("DVC_EXP_BASELINE_REV"):
+        return revision
+    command = ["git", "rev-parse", "HEAD"]
+    answer = subprocess.run(command, capture_output=True, text=True, check=False)
+    return answer.stdout.strip() or "unknown"
+
+
+def _running_stage(address: str) -> StageFiles:
+    """The running stage as DVC is about to write it to ``dvc.lock``."""
+    from dvc.repo import Repo
+    from dvc.stage.serialize import to_single_stage_lockfile
+
+    with Repo() as repo:
+        stage = repo.stage.load_one(address)
+        stage.save_deps()
+        return StageFiles.of(address, to_single_stage_lockfile(stage))
+
+
+def _check_outputs(stage: StageFiles) -> None:
+    for path, expected in stage.outputs.items():
+        file = Path(path)
+        if not file.exists():
+            raise InputError(path, f"missing, made by the stage {stage.address}", "dvc repro first")
+        recorded = file.is_file() and file.parts[0] != "data"
+        if recorded and expected not in (None, md5(file.read_bytes()).hexdigest()):
+            raise InputError(path, "is not the one that dvc.lock names", "dvc repro first")
+
+
+def _attempt(action: Callable[[], Value]) -> Value | None:
+    try:
+        return action()
+    except Exception as error:
+        logger.warning("MLflow: not recorded: %s: %s", type(error).__name__, error)
+        return None
