@@ -1,0 +1,61 @@
+"""Guided LGP, best-first: the policy as the heuristic of a complete search (beyond the paper)."""
+
+from heapq import heappop, heappush
+from typing import Literal
+
+from guided_lgp.logic import Objective, Symbols, validate_objective
+from guided_lgp.params import SearchLimits
+from guided_lgp.scene import Scene
+from guided_lgp.search.bounds import Bounds
+from guided_lgp.search.guided import GuidedTree, Node
+from guided_lgp.search.observation import start
+from guided_lgp.search.policy import Policy
+from guided_lgp.search.result import Run, SearchResult
+
+Ordering = Literal["cumulative", "discrepancy"]
+"""Cumulative log p, or log p - max log p of the siblings, summed along the sequence."""
+
+
+def plan(
+    scene: Scene,
+    objective: Objective,
+    symbols: Symbols,
+    bounds: Bounds,
+    policy: Policy,
+    limits: SearchLimits,
+    adapt: bool = True,
+    ordering: Ordering = "discrepancy",
+) -> SearchResult:
+    """Take the best node of a frontier that keeps every child.
+
+    A sequence whose coarse bound is infeasible is pruned with all that begins with it. Complete
+    up to ``limits.max_depth``: whatever has a feasible sequence is found, unless
+    ``limits.max_tree_size`` ends the search before. Equal costs: deeper first, then older first.
+
+    Raises:
+        InputError: the objective is contradictory, unknown or already satisfied.
+    """
+    validate_objective(objective, symbols, scene.state)
+    run = Run(bounds, policy)
+    tree = GuidedTree(scene, objective, symbols, run, adapt)
+    frontier: list[tuple[float, int, int, Node]] = [(0.0, 0, 0, tree.root)]
+    while frontier:
+        if tree.size >= limits.max_tree_size:
+            return run.result(tree.size, "stopped")
+        node = heappop(frontier)[-1]
+        configuration = start(scene)
+        if node.skeleton:
+            coarse = run.coarse(node.skeleton)
+            if not coarse.feasible:
+                continue
+            configuration = coarse.retreated[-1]
+        if tree.satisfied(node):
+            if run.solve(node.skeleton):
+                return run.result(tree.size)
+            continue
+        if len(node.skeleton) >= limits.max_depth:
+            continue
+        for child in tree.expand(node, configuration):
+            cost = -child.log_p if ordering == "cumulative" else -child.discrepancy
+            heappush(frontier, (cost, -len(child.skeleton), child.number, child))
+    return run.result(tree.size, "exhausted")

@@ -1,0 +1,84 @@
+"""Breadth-first search with duplicate detection: a rival of the guided search."""
+
+from collections.abc import Iterator
+
+from guided_lgp.logic import Objective, Skeleton, Symbols, validate_objective
+from guided_lgp.params import SearchLimits
+from guided_lgp.scene import Scene
+from guided_lgp.search.bounds import Bounds
+from guided_lgp.search.result import Run, SearchResult
+from guided_lgp.search.tree import StateSpace, distances
+
+
+def plan(
+    scene: Scene, objective: Objective, symbols: Symbols, bounds: Bounds, limits: SearchLimits
+) -> SearchResult:
+    """Breadth-first over distinct states, then all sequences through them in order of length.
+
+    The first sequence may be geometrically infeasible, so the graph is kept with all its
+    transitions and read off backwards: sequences of length 1, 2, ... that reach the objective for
+    the first time at their end. What begins with an infeasible sequence is left out. Ends at
+    ``limits.max_depth`` or ``limits.max_tree_size``; the tree size is the number of distinct states
+    plus that of the nodes of the sequences read off.
+
+    Raises:
+        InputError: the objective is contradictory, unknown or already satisfied.
+    """
+    validate_objective(objective, symbols, scene.state)
+    run = Run(bounds)
+    graph = _Graph(StateSpace(symbols, scene.state), objective, limits.max_tree_size)
+    for length in range(1, limits.max_depth + 1):
+        run.expansions += graph.expand_layer()
+        for skeleton in graph.sequences(length):
+            if run.solve(skeleton):
+                return run.result(graph.size)
+            graph.excluded.add(run.failed)
+        if graph.size >= limits.max_tree_size:
+            return run.result(graph.size, "stopped")
+    return run.result(graph.size, "exhausted")
+
+
+class _Graph:
+    """The states within some number of actions of the start, all expanded."""
+
+    def __init__(self, space: StateSpace, objective: Objective, max_size: int) -> None:
+        self._space = space
+        self._objective = objective
+        self._max_size = max_size
+        self._next = 0
+        self._sequence_nodes = 0
+        self.excluded: set[Skeleton] = set()
+
+    @property
+    def size(self) -> int:
+        return len(self._space.states) + self._sequence_nodes
+
+    def expand_layer(self) -> int:
+        """Expand the states found last; how many they were."""
+        layer = range(self._next, len(self._space.states))
+        for state in layer:
+            self._space.transitions(state)
+        self._next = layer.stop
+        return len(layer)
+
+    def sequences(self, length: int) -> Iterator[Skeleton]:
+        """Sequences of one length to the objective that pass no excluded one."""
+        to_go = distances(self._space, self._objective)
+        yield from self._extend((), 0, length, to_go)
+
+    def _extend(
+        self, prefix: Skeleton, state: int, length: int, to_go: dict[int, int]
+    ) -> Iterator[Skeleton]:
+        if length == 0:
+            yield prefix
+            return
+        for action, target in self._space.transitions(state):
+            steps = to_go.get(target, length)
+            if steps > length - 1 or (steps == 0 and length > 1):
+                continue
+            if prefix in self.excluded or self.size >= self._max_size:
+                return
+            self._sequence_nodes += 1
+            child = (*prefix, action)
+            if child not in self.excluded:
+                yield from self._extend(child, target, length - 1, to_go)

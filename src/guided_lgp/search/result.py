@@ -1,0 +1,186 @@
+"""What a planner returns, and the bookkeeping that all planners share."""
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from guided_lgp.logic import Action, Objective, Skeleton, State, format_skeleton
+from guided_lgp.nlp.results import Array, CoarseResult, Failure, PathResult
+from guided_lgp.search.bounds import Bounds
+from guided_lgp.search.policy import Policy
+
+Cause = Literal["infeasible", "max_depth"]
+"""Why an attempt of the guided search ended (paper, Table I)."""
+
+Reason = Literal["stopped", "exhausted", "attempts"]
+"""Why a search ended without a plan: node limit, nothing left to expand, or no reattempt left."""
+
+_REASONS: Mapping[Reason, str] = {
+    "stopped": "stopped at the limit of the tree size",
+    "exhausted": "every sequence within the depth limit is infeasible",
+    "attempts": "the last allowed attempt failed",
+}
+
+
+@dataclass(frozen=True)
+class Times:
+    """Where the time of a search went (s).
+
+    A verdict that another search has already computed counts with the time it took then.
+    """
+
+    symbolic: float
+    policy: float
+    coarse: float
+    path: float
+
+    @property
+    def total(self) -> float:
+        """Sum of all parts."""
+        return self.symbolic + self.policy + self.coarse + self.path
+
+
+@dataclass(frozen=True)
+class SearchResult:
+    """The plan found, or why there is none, and what the search cost."""
+
+    coarse: CoarseResult | None
+    path: PathResult | None
+    tree_size: int
+    """Nodes generated, root included, over all attempts."""
+    expansions: int
+    policy_calls: int
+    coarse_calls: int
+    path_calls: int
+    causes: tuple[Cause, ...]
+    """Why each failed attempt ended, in order; empty for searches without attempts."""
+    reattempts: Mapping[Cause, int]
+    """How many attempts followed a failed one, by the cause of that failure."""
+    times: Times
+    reason: Reason | None = None
+    failure: Failure | None = None
+    """The last verdict of the NLP against a sequence, if there was one ..."""
+    failed: Skeleton = ()
+    """... and that sequence."""
+
+    @property
+    def solved(self) -> bool:
+        """Whether a verified path was found."""
+        return self.path is not None
+
+    @property
+    def skeleton(self) -> Skeleton | None:
+        """The plan's sequence of actions."""
+        return self.path.skeleton if self.path is not None else None
+
+    @property
+    def explanation(self) -> str:
+        """One line: why there is no plan; empty if there is one."""
+        if self.reason is None:
+            return ""
+        line = f"{_REASONS[self.reason]} ({self.tree_size} nodes)"
+        if self.failure is None:
+            return line
+        return f"{line}; last sequence tried: {format_skeleton(self.failed)}: {self.failure}"
+
+
+class Run:
+    """One run of a planner: the bounds and the policy as it sees them, with their cost."""
+
+    def __init__(self, bounds: Bounds, policy: Policy | None = None) -> None:
+        self._bounds = bounds
+        self._policy = policy
+        self._start = time.perf_counter()
+        self._waited = 0.0
+        self._policy_s = self._coarse_s = self._path_s = 0.0
+        self._asked: dict[Skeleton, CoarseResult] = {}
+        self._path_calls = self._policy_calls = 0
+        self._failure: Failure | None = None
+        self.failed: Skeleton = ()
+        """The sequence of the last verdict against one; no feasible sequence begins with it."""
+        self._causes: list[Cause] = []
+        self.expansions = 0
+        self.solution: tuple[CoarseResult, PathResult] | None = None
+
+    def coarse(self, skeleton: Skeleton) -> CoarseResult:
+        """P_coarse of a sequence, its prefixes first: they warm-start it.
+
+        Returns:
+            The verdict on ``skeleton``; if a prefix is already infeasible, the verdict on the
+            shortest such prefix, which excludes everything that begins with it.
+        """
+        for length in range(1, len(skeleton) + 1):
+            result = self._verdict(skeleton[:length])
+            if not result.feasible:
+                self._failure, self.failed = result.failure, result.skeleton
+                break
+        return result
+
+    def _verdict(self, skeleton: Skeleton) -> CoarseResult:
+        result = self._asked.get(skeleton)
+        if result is None:
+            start = time.perf_counter()
+            result = self._asked[skeleton] = self._bounds.coarse(skeleton)
+            self._waited += time.perf_counter() - start
+            self._coarse_s += result.time_s
+        return result
+
+    def solve(self, skeleton: Skeleton) -> bool:
+        """Coarse, then path bound of a sequence that satisfies the objective."""
+        coarse = self.coarse(skeleton)
+        if not coarse.feasible:
+            return False
+        start = time.perf_counter()
+        path = self._bounds.path(skeleton)
+        self._waited += time.perf_counter() - start
+        self._path_s += path.time_s
+        self._path_calls += 1
+        if path.feasible:
+            self.solution = coarse, path
+        else:
+            self._failure, self.failed = path.failure, skeleton
+        return path.feasible
+
+    def log_probabilities(
+        self,
+        objective: Objective,
+        state: State,
+        positions: Mapping[str, Array],
+        actions: Sequence[Action],
+    ) -> Array:
+        """The policy's scores of the actions; see :class:`~guided_lgp.search.policy.Policy`."""
+        assert self._policy is not None
+        start = time.perf_counter()
+        scores = self._policy.log_probabilities(objective, state, positions, actions)
+        elapsed = time.perf_counter() - start
+        self._policy_s += elapsed
+        self._waited += elapsed
+        self._policy_calls += 1
+        return scores
+
+    def attempt_failed(self, cause: Cause) -> None:
+        """Note the end of an attempt."""
+        self._causes.append(cause)
+
+    def result(self, tree_size: int, reason: Reason | None = None) -> SearchResult:
+        """The result of the run: solved, or ended for a reason."""
+        followed = self._causes if reason is None else self._causes[:-1]
+        causes: tuple[Cause, ...] = ("infeasible", "max_depth")
+        coarse, path = self.solution or (None, None)
+        symbolic = time.perf_counter() - self._start - self._waited
+        return SearchResult(
+            coarse=coarse,
+            path=path,
+            tree_size=tree_size,
+            expansions=self.expansions,
+            policy_calls=self._policy_calls,
+            coarse_calls=len(self._asked),
+            path_calls=self._path_calls,
+            causes=tuple(self._causes),
+            reattempts={cause: followed.count(cause) for cause in causes},
+            times=Times(symbolic, self._policy_s, self._coarse_s, self._path_s),
+            reason=reason,
+            failure=None if reason is None else self._failure,
+            failed=() if reason is None else self.failed,
+        )

@@ -1,0 +1,69 @@
+"""Level sizes of the logic tree and the permissive rules (DESIGN §2)."""
+
+import pytest
+
+from guided_lgp.errors import InputError
+from guided_lgp.logic import (
+    Action,
+    Goal,
+    State,
+    Symbols,
+    applicable_actions,
+    format_skeleton,
+    parse_skeleton,
+    progress,
+)
+
+SETUP_A = Symbols(("pr2L", "pr2R"), ("red", "green", "blue"), ("tab1", "tab2"))
+ON_TAB1 = State.of({"red": "tab1", "green": "tab1", "blue": "tab1"})
+
+
+def test_order_of_children() -> None:
+    state = progress(ON_TAB1, parse_skeleton("(grasp pr2R green)"))
+    assert [str(action) for action in applicable_actions(state, SETUP_A)] == [
+        "(grasp pr2L red)",
+        "(grasp pr2L blue)",
+        "(place pr2R green tab1)",
+        "(place pr2R green tab2)",
+        "(place pr2R green red)",
+        "(place pr2R green blue)",
+    ]
+
+
+def test_what_stands_on_a_box_moves_with_it() -> None:
+    skeleton = parse_skeleton(
+        "(grasp pr2L red) (place pr2L red green) (grasp pr2R green) (place pr2R green tab2)"
+    )
+    state = progress(ON_TAB1, skeleton)
+    assert state == State.of({"red": "green", "green": "tab2", "blue": "tab1"})
+
+
+def test_no_place_on_what_stands_on_the_box() -> None:
+    tower = State.of({"red": "tab1", "green": "red", "blue": "green"})
+    state = progress(tower, parse_skeleton("(grasp pr2L red)"))
+    places = [a.table for a in applicable_actions(state, SETUP_A) if a.instruction == "place"]
+    assert places == ["tab1", "tab2"]
+
+
+def test_place_on_a_held_box_and_grasp_under_a_load_are_legal() -> None:
+    state = progress(ON_TAB1, parse_skeleton("(grasp pr2L red) (grasp pr2R green)"))
+    assert Action("place", "pr2R", "green", "red") in list(applicable_actions(state, SETUP_A))
+    tower = State.of({"red": "tab1", "green": "red", "blue": "tab1"})
+    assert Action("grasp", "pr2L", "red") in list(applicable_actions(tower, SETUP_A))
+
+
+def test_goal_on_does_not_hold_while_the_box_is_held() -> None:
+    held = progress(ON_TAB1, parse_skeleton("(grasp pr2L red)"))
+    assert held.satisfies(Goal("held", "red"))
+    assert not held.satisfies(Goal("on", "red", "tab1"))
+
+
+def test_skeletons_survive_writing_and_reading() -> None:
+    text = "(grasp pr2L red) (place pr2L red tab2)"
+    assert format_skeleton(parse_skeleton(text)) == text
+
+
+@pytest.mark.parametrize("text", ["(grasp pr2L)", "(push pr2L red)", "(place pr2L red)", "grasp"])
+def test_bad_actions_are_named(text: str) -> None:
+    with pytest.raises(InputError, match="is not an action"):
+        Action.parse(text)

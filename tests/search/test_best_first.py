@@ -1,0 +1,79 @@
+"""Guided LGP, best-first: complete with any policy, prunes, deterministic."""
+
+import pytest
+from scripted import UNIFORM, Scorer, ScriptedBounds
+
+from guided_lgp.logic import Skeleton, parse_objective, parse_skeleton, progress, satisfied
+from guided_lgp.params import SearchLimits
+from guided_lgp.scene.model import Scene
+from guided_lgp.search import best_first, breadth_first
+from guided_lgp.search.best_first import Ordering
+
+TOWER = parse_objective(["(on red green)", "(on green blue)"])
+BOTH: list[Ordering] = ["cumulative", "discrepancy"]
+
+
+def left_hand_fails(skeleton: Skeleton) -> bool:
+    return skeleton[-1].gripper == "pr2R"
+
+
+@pytest.mark.parametrize("ordering", BOTH)
+def test_a_uniform_policy_solves_four_actions(scene: Scene, ordering: Ordering) -> None:
+    limits = SearchLimits(max_depth=4, reattempts=0, max_tree_size=20_000)
+    bounds = ScriptedBounds(scene)
+    result = best_first.plan(
+        scene, TOWER, scene.symbols, bounds, UNIFORM, limits, ordering=ordering
+    )
+    assert result.skeleton is not None
+    assert len(result.skeleton) == 4
+    assert satisfied(progress(scene.state, result.skeleton), TOWER)
+
+
+@pytest.mark.parametrize("ordering", BOTH)
+def test_finds_what_breadth_first_finds(
+    scene: Scene, limits: SearchLimits, ordering: Ordering
+) -> None:
+    misled = Scorer(lambda objective, state, action: -5.0 * (action.gripper == "pr2R"))
+    objective = parse_objective(["(on red tab2)", "(held blue)"])
+    limits = limits.model_copy(update={"max_depth": 3})
+    plans = [
+        breadth_first.plan(
+            scene, objective, scene.symbols, ScriptedBounds(scene, left_hand_fails), limits
+        ),
+        best_first.plan(
+            scene,
+            objective,
+            scene.symbols,
+            ScriptedBounds(scene, left_hand_fails),
+            misled,
+            limits,
+            ordering=ordering,
+        ),
+    ]
+    assert all(plan.solved for plan in plans)
+    assert plans[0].skeleton == plans[1].skeleton
+
+
+def test_what_begins_with_an_infeasible_step_is_pruned(scene: Scene, limits: SearchLimits) -> None:
+    bounds = ScriptedBounds(scene, left_hand_fails)
+    best_first.plan(scene, TOWER, scene.symbols, bounds, UNIFORM, limits)
+    assert all(left_hand_fails(skeleton[:-1]) for skeleton in bounds.coarse_asked if skeleton[:-1])
+
+
+def test_nothing_feasible_is_exhausted_not_endless(scene: Scene, limits: SearchLimits) -> None:
+    bounds = ScriptedBounds(scene, path=lambda skeleton: False)
+    limits = limits.model_copy(update={"max_depth": 2})
+    result = best_first.plan(
+        scene, parse_objective(["(held red)"]), scene.symbols, bounds, UNIFORM, limits
+    )
+    assert result.reason == "exhausted"
+    assert parse_skeleton("(grasp pr2L red)") in bounds.path_asked
+
+
+def test_same_search_twice(scene: Scene, limits: SearchLimits) -> None:
+    first, second = (
+        best_first.plan(scene, TOWER, scene.symbols, ScriptedBounds(scene), UNIFORM, limits)
+        for _ in range(2)
+    )
+    assert (first.skeleton, first.tree_size) == (second.skeleton, second.tree_size)
+    assert (first.expansions, first.coarse_calls) == (second.expansions, second.coarse_calls)

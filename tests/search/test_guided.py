@@ -1,0 +1,115 @@
+"""Guided LGP: greedy steps, reattempts by cause, adaptation, tree size (paper, Appendix)."""
+
+import pytest
+from scripted import UNIFORM, Scorer, ScriptedBounds
+
+from guided_lgp.errors import InputError
+from guided_lgp.logic import Action, Objective, State, parse_objective, parse_skeleton, progress
+from guided_lgp.params import SearchLimits
+from guided_lgp.scene.model import Scene
+from guided_lgp.search import guided
+
+TOWER = parse_objective(["(on red green)", "(on green blue)"])
+PLAN = parse_skeleton(
+    "(grasp pr2L green) (place pr2L green blue) (grasp pr2R red) (place pr2R red green)"
+)
+
+
+START = State.of({"red": "tab1", "green": "tab1", "blue": "tab1"})
+ADVICE = {progress(START, PLAN[:k]): action for k, action in enumerate(PLAN)}
+
+
+def prefers_plan(objective: Objective, state: State, action: Action) -> float:
+    return 2.0 * (action == ADVICE[state])
+
+
+def test_follows_a_known_plan(scene: Scene, limits: SearchLimits) -> None:
+    bounds = ScriptedBounds(scene)
+    result = guided.plan(scene, TOWER, scene.symbols, bounds, Scorer(prefers_plan), limits)
+    assert result.skeleton == PLAN
+    assert result.policy_calls == result.expansions == 4
+    assert result.causes == ()
+    assert bounds.path_asked == [PLAN]
+
+
+def test_tree_size_counts_all_children(scene: Scene, limits: SearchLimits) -> None:
+    objective = parse_objective(["(on red tab2)"])
+    likes = parse_skeleton("(grasp pr2R red) (place pr2R red tab2)")
+    policy = Scorer(lambda objective, state, action: 2.0 * (action in likes))
+    result = guided.plan(scene, objective, scene.symbols, ScriptedBounds(scene), policy, limits)
+    assert result.skeleton == likes
+    assert result.tree_size == 1 + 6 + 6
+
+
+def test_reattempt_after_an_infeasible_step(scene: Scene, limits: SearchLimits) -> None:
+    objective = parse_objective(["(on red tab2)"])
+    likes = {"(grasp pr2L red)": 3.0, "(grasp pr2R red)": 2.0}
+    likes |= {"(place pr2L red tab2)": 3.0, "(place pr2R red tab2)": 3.0}
+    policy = Scorer(lambda objective, state, action: likes.get(str(action), 0.0))
+    bounds = ScriptedBounds(scene, coarse=lambda skeleton: skeleton[-1].gripper == "pr2R")
+    result = guided.plan(scene, objective, scene.symbols, bounds, policy, limits)
+    assert result.skeleton == parse_skeleton("(grasp pr2R red) (place pr2R red tab2)")
+    assert result.causes == ("infeasible",)
+    assert result.reattempts == {"infeasible": 1, "max_depth": 0}
+    assert result.tree_size == 1 + 6 + 6
+
+
+def test_reattempt_after_an_infeasible_path(scene: Scene, limits: SearchLimits) -> None:
+    objective = parse_objective(["(held red)"])
+    likes = {"(grasp pr2L red)": 3.0, "(grasp pr2R red)": 2.0}
+    policy = Scorer(lambda objective, state, action: likes.get(str(action), 0.0))
+    bounds = ScriptedBounds(scene, path=lambda skeleton: skeleton[0].gripper == "pr2R")
+    result = guided.plan(scene, objective, scene.symbols, bounds, policy, limits)
+    assert result.skeleton == parse_skeleton("(grasp pr2R red)")
+    assert result.causes == ("infeasible",)
+    assert len(bounds.path_asked) == 2
+
+
+def test_maximum_depth_ends_attempts(scene: Scene) -> None:
+    never = Scorer(lambda objective, state, action: -9.0 * (action.box == "red"))
+    limits = SearchLimits(max_depth=3, reattempts=2, max_tree_size=20_000)
+    bounds = ScriptedBounds(scene)
+    result = guided.plan(
+        scene, parse_objective(["(held red)"]), scene.symbols, bounds, never, limits
+    )
+    assert not result.solved
+    assert result.reason == "attempts"
+    assert result.causes == ("max_depth",) * 3
+    assert result.reattempts == {"infeasible": 0, "max_depth": 2}
+    assert all(len(skeleton) <= 3 for skeleton in bounds.coarse_asked)
+
+
+def test_failed_nodes_are_never_tried_again(scene: Scene) -> None:
+    bounds = ScriptedBounds(scene, coarse=lambda skeleton: False)
+    limits = SearchLimits(max_depth=8, reattempts=100, max_tree_size=20_000)
+    result = guided.plan(scene, TOWER, scene.symbols, bounds, UNIFORM, limits)
+    assert result.reason == "exhausted"
+    assert result.tree_size == 7
+    assert len(bounds.coarse_asked) == len(set(bounds.coarse_asked)) == 6
+    assert "every sequence within the depth limit is infeasible" in result.explanation
+
+
+@pytest.mark.parametrize("adapt", [False, True])
+def test_adaptation_encodes_unsatisfied_goals(
+    scene: Scene, limits: SearchLimits, adapt: bool
+) -> None:
+    seen: list[Objective] = []
+
+    def score(objective: Objective, state: State, action: Action) -> float:
+        seen.append(objective)
+        return 2.0 * (action in PLAN[:2])
+
+    objective = parse_objective(["(on blue tab1)", "(on green blue)"])  # blue is there already
+    guided.plan(
+        scene, objective, scene.symbols, ScriptedBounds(scene), Scorer(score), limits, adapt
+    )
+    assert set(seen) == {objective[1:] if adapt else objective}
+
+
+def test_bad_objectives_are_answered_at_once(scene: Scene, limits: SearchLimits) -> None:
+    bounds = ScriptedBounds(scene)
+    with pytest.raises(InputError, match="already holds"):
+        guided.plan(
+            scene, parse_objective(["(on red tab1)"]), scene.symbols, bounds, UNIFORM, limits
+        )
+    assert not bounds.coarse_asked

@@ -1,0 +1,97 @@
+"""Breadth-first with duplicate detection, and A*: shortest plans first, complete when some fail."""
+
+from collections.abc import Callable
+
+import pytest
+from scripted import ScriptedBounds, make_scene
+
+from guided_lgp.logic import (
+    Objective,
+    Skeleton,
+    parse_objective,
+    progress,
+    satisfied,
+    two_goal_objectives,
+)
+from guided_lgp.logic.strips import facts, goal_facts, relaxed_operators
+from guided_lgp.params import SearchLimits
+from guided_lgp.scene.model import Scene
+from guided_lgp.search import classical, graph
+from guided_lgp.search.landmark_cut import landmark_cut
+from guided_lgp.search.result import SearchResult
+from guided_lgp.search.tree import StateSpace, distances
+
+LIMITS = SearchLimits(max_depth=12, reattempts=0, max_tree_size=400_000)
+TOWER = parse_objective(["(on red green)", "(on green blue)"])
+RIVALS = [graph.plan, classical.plan]
+Planner = Callable[..., SearchResult]
+
+
+@pytest.mark.parametrize("plan", RIVALS)
+def test_shortest_plan_first(plan: Planner, scene: Scene) -> None:
+    bounds = ScriptedBounds(scene)
+    result = plan(scene, TOWER, scene.symbols, bounds, LIMITS)
+    assert result.skeleton is not None
+    assert len(result.skeleton) == 4
+    assert satisfied(progress(scene.state, result.skeleton), TOWER)
+    assert bounds.path_asked == [result.skeleton]
+
+
+@pytest.mark.parametrize("plan", RIVALS)
+def test_next_sequence_when_the_first_fails(plan: Planner, scene: Scene) -> None:
+    """Only the right hand reaches, and only sequences of six actions have a path."""
+    bounds = ScriptedBounds(
+        scene,
+        coarse=lambda skeleton: skeleton[-1].gripper == "pr2R",
+        path=lambda skeleton: len(skeleton) == 6,
+    )
+    result = plan(scene, TOWER, scene.symbols, bounds, LIMITS)
+    assert result.skeleton is not None
+    assert len(result.skeleton) == 6
+    assert {action.gripper for action in result.skeleton} == {"pr2R"}
+    lengths = [len(skeleton) for skeleton in bounds.path_asked]
+    assert lengths == sorted(lengths)
+    assert len(set(bounds.path_asked)) == len(lengths)
+
+
+@pytest.mark.parametrize("plan", RIVALS)
+def test_gives_up_with_a_reason(plan: Planner, scene: Scene) -> None:
+    bounds = ScriptedBounds(scene, coarse=lambda skeleton: len(skeleton) < 3)
+    deep = LIMITS.model_copy(update={"max_depth": 5})
+    result = plan(scene, TOWER, scene.symbols, bounds, deep)
+    assert result.reason == "exhausted"
+    small = LIMITS.model_copy(update={"max_tree_size": 50})
+    result = plan(scene, TOWER, scene.symbols, ScriptedBounds(scene, lambda _: False), small)
+    assert result.reason in {"stopped", "exhausted"}
+    assert not result.solved
+
+
+def test_exclusion_saves_verdicts(scene: Scene) -> None:
+    def rule(skeleton: Skeleton) -> bool:
+        return str(skeleton[0]) == "(grasp pr2R green)"
+
+    bounds = ScriptedBounds(scene, coarse=rule)
+    result = classical.plan(scene, TOWER, scene.symbols, bounds, LIMITS)
+    assert result.skeleton is not None
+    first_actions = {skeleton[0] for skeleton in bounds.coarse_asked if not rule(skeleton)}
+    asked = [skeleton for skeleton in bounds.coarse_asked if not rule(skeleton)]
+    assert len(asked) == len(first_actions)
+
+
+def test_landmark_cut_is_admissible_and_informed() -> None:
+    scene = make_scene(3, tray=False)
+    symbols = scene.symbols
+    space = StateSpace(symbols, scene.state)
+    space.explore()
+    operators = relaxed_operators(symbols)
+    objectives: list[Objective] = [TOWER, *two_goal_objectives(symbols)[::7]]
+    informed = 0
+    for objective in objectives:
+        exact = distances(space, objective)
+        goals = goal_facts(objective)
+        for number, state in enumerate(space.states):
+            bound = landmark_cut(facts(state, symbols), goals, operators)
+            assert bound <= exact[number]
+            assert (bound == 0) == (exact[number] == 0)
+            informed += bound == exact[number]
+    assert informed > 0.8 * len(objectives) * len(space.states)
