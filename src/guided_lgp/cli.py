@@ -10,12 +10,15 @@ import os
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict
+from importlib import import_module
+from pathlib import Path
 from typing import Annotated
 
 import typer
 from typer.exceptions import TyperException
 
 from guided_lgp.errors import InputError, WorkerError
+from guided_lgp.paths import PARAMS
 
 app = typer.Typer(
     name="guided-lgp",
@@ -23,10 +26,17 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
+STAGES = {
+    "generate_scenes": "guided_lgp.experiments.generate_scenes",
+    "enumerate_sequences": "guided_lgp.experiments.enumerate_sequences",
+}
+"""The module of each stage of dvc.yaml; its ``run(params, root)`` does the work."""
+
 mlflow_app = typer.Typer(help="The MLflow dashboard of pipeline runs.", no_args_is_help=True)
 app.add_typer(mlflow_app, name="mlflow")
 
 AsJson = Annotated[bool, typer.Option("--json", help="Write JSON to standard output.")]
+ParamsFile = Annotated[Path, typer.Option(help="File with the parameters of all stages.")]
 
 
 @app.callback()
@@ -58,6 +68,24 @@ def doctor(as_json: AsJson = False) -> None:
         raise typer.Exit(1)
 
 
+@app.command("generate_scenes")
+def generate_scenes(params: ParamsFile = PARAMS) -> None:
+    """Draw the configurations for training, test and scalability: data/scenes.
+
+    Example: guided-lgp generate_scenes
+    """
+    _run_stage("generate_scenes", params)
+
+
+@app.command("enumerate_sequences")
+def enumerate_sequences(params: ParamsFile = PARAMS) -> None:
+    """Find every shortest feasible sequence of every configuration: data/sequences.
+
+    Example: guided-lgp enumerate_sequences
+    """
+    _run_stage("enumerate_sequences", params)
+
+
 @mlflow_app.command("ui")
 def mlflow_ui(
     port: Annotated[int, typer.Option(help="TCP port on 127.0.0.1.", min=1, max=65535)] = 5000,
@@ -87,6 +115,17 @@ def mlflow_sync() -> None:
     now, before = tracking.sync(load_params())
     typer.echo(f"recorded {len(now)} stages {' '.join(now)}".strip())
     typer.echo(f"already recorded: {len(before)}")
+
+
+def _run_stage(stage: str, params_file: Path, *arguments: str) -> None:
+    """Check all parameters, then run a stage and record it."""
+    from guided_lgp import tracking
+    from guided_lgp.params import load_params
+
+    params = load_params(params_file)
+    module = import_module(STAGES[stage])
+    with tracking.recorded("@".join([stage, *arguments]), params):
+        module.run(params, Path.cwd(), *arguments)
 
 
 def stage_main(stage: str) -> None:

@@ -327,7 +327,7 @@ def _running_stage(address: str) -> StageFiles:
     from dvc.stage.serialize import to_single_stage_lockfile
 
     with Repo() as repo:
-        stage = repo.stage.load_one(address)
+        stage = repo.stage.load_one(name=address)
         stage.save_deps()
         return StageFiles.of(address, to_single_stage_lockfile(stage))
 

@@ -1,0 +1,176 @@
+"""MLflow: what is recorded, once, and never at the expense of a stage's results."""
+
+import json
+import logging
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from guided_lgp import tracking
+from guided_lgp.errors import InputError
+from guided_lgp.params import Params, load_params
+
+ROOT = Path(__file__).parents[1]
+PARAMS = load_params(ROOT / "params.yaml")
+METRICS = {"accuracy": 0.9, "loss": {"training": [2.0, 1.0, 0.5]}, "note": "text", "nan": None}
+PIPELINE = """
+stages:
+  generate_scenes:
+    cmd: python write.py
+    deps: [write.py]
+    params: [generate_scenes]
+    outs:
+      - data
+      - reports/training/place.json:
+          cache: false
+"""
+WRITE = f"""
+from pathlib import Path
+for path, text in [("data/x", "1"), ("reports/training/place.json", {json.dumps(METRICS)!r})]:
+    Path(path).parent.mkdir(parents=True, exist_ok=True)
+    Path(path).write_text(text)
+"""
+
+
+@pytest.fixture(scope="module")
+def database(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A database whose tables are made once for all tests here."""
+    file = tmp_path_factory.mktemp("mlflow") / "template.db"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("MLFLOW_TRACKING_URI", f"sqlite:///{file}")
+        tracking.prepare()
+    return file
+
+
+@pytest.fixture
+def clone(tmp_path: Path, database: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A small pipeline whose stage has run, as the working directory, with a database."""
+    (tmp_path / ".dvc").mkdir()
+    (tmp_path / ".dvc" / "config").write_text("[core]\n    no_scm = true\n    analytics = false\n")
+    (tmp_path / "dvc.yaml").write_text(PIPELINE)
+    (tmp_path / "write.py").write_text(WRITE)
+    (tmp_path / "params.yaml").write_text((ROOT / "params.yaml").read_text())
+    (tmp_path / "mlflow.db").write_bytes(database.read_bytes())
+    monkeypatch.chdir(tmp_path)
+    for name in ("MLFLOW_TRACKING_URI", "DVC_ROOT", "DVC_EXP_NAME", "DVC_EXP_BASELINE_REV"):
+        monkeypatch.delenv(name, raising=False)
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    environment = {**os.environ, "PATH": path}
+    subprocess.run(["dvc", "repro", "-q"], check=True, env=environment)
+    return tmp_path
+
+
+def runs() -> list[Any]:
+    client = tracking.prepare()
+    experiment = client.get_experiment_by_name(tracking.EXPERIMENT).experiment_id
+    return list(client.search_runs([experiment], order_by=["attributes.start_time ASC"]))
+
+
+def children() -> list[Any]:
+    return [run for run in runs() if tracking.STAGE_TAG in run.data.tags]
+
+
+def record(params: Params = PARAMS) -> None:
+    with tracking.recorded("generate_scenes", params):
+        pass
+
+
+def test_the_database_is_the_clones_own(clone: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert tracking.tracking_uri() == f"sqlite:///{clone}/mlflow.db"
+    (clone / "sub").mkdir()
+    monkeypatch.chdir(clone / "sub")
+    assert tracking.tracking_uri() == f"sqlite:///{clone}/mlflow.db"
+    monkeypatch.setenv("MLFLOW_TRACKING_URI", "http://127.0.0.1:5000")
+    assert tracking.tracking_uri() == "http://127.0.0.1:5000"
+
+
+def test_temporary_experiments_record_in_their_origin(
+    clone: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    temporary = clone / ".dvc" / "tmp" / "exps" / "temp"
+    temporary.mkdir(parents=True)
+    (temporary / "dvc.yaml").write_text(PIPELINE)
+    monkeypatch.chdir(temporary)
+    assert tracking.repository() == clone
+
+
+def test_one_parent_per_execution_and_a_child_per_stage(clone: Path) -> None:
+    record()
+    record()
+    parent, first, second = runs()
+    for child in (first, second):
+        assert child.data.tags["mlflow.parentRunId"] == parent.info.run_id
+        assert child.data.params["seed_training"] == str(PARAMS.generate_scenes.seed_training)
+        assert child.info.status == parent.info.status == "FINISHED"
+    assert parent.data.params["train_policy.place.dropout"] == "0.1"
+    assert parent.data.metrics["place.accuracy"] == 0.9
+    assert first.data.tags[tracking.KEY_TAG] == second.data.tags[tracking.KEY_TAG]
+
+
+def test_metrics_curves_and_files_are_recorded(clone: Path) -> None:
+    record()
+    (child,) = children()
+    assert child.data.metrics == {"accuracy": 0.9, "loss.training": 0.5}
+    client = tracking.prepare()
+    curve = client.get_metric_history(child.info.run_id, "loss.training")
+    assert [(point.step, point.value) for point in curve] == [(0, 2.0), (1, 1.0), (2, 0.5)]
+    files = [item.path for item in client.list_artifacts(child.info.run_id, "training")]
+    assert files == ["training/place.json"]
+
+
+def test_a_failing_stage_is_recorded_as_failed(clone: Path) -> None:
+    with (
+        pytest.raises(ZeroDivisionError),
+        tracking.recorded("generate_scenes", PARAMS),
+    ):
+        raise ZeroDivisionError("no results")
+    parent, child = runs()
+    assert child.info.status == parent.info.status == "FAILED"
+    assert child.data.tags["error"] == "ZeroDivisionError: no results"
+
+
+def test_tracking_problems_are_warnings(
+    clone: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    (clone / "file").write_text("not a folder")
+    monkeypatch.setenv("MLFLOW_TRACKING_URI", "unknown-scheme://nowhere")
+    with caplog.at_level(logging.WARNING, logger="guided_lgp"):
+        record()
+    assert "MLflow: not recorded" in caplog.text
+
+
+def test_sync_records_once(clone: Path) -> None:
+    assert tracking.sync(PARAMS) == (["generate_scenes"], [])
+    assert tracking.sync(PARAMS) == ([], ["generate_scenes"])
+    (child,) = children()
+    assert child.data.tags["restored"] == "True"
+
+
+def test_sync_leaves_what_a_stage_recorded_itself(clone: Path) -> None:
+    record()
+    assert tracking.sync(PARAMS) == ([], ["generate_scenes"])
+
+
+def test_sync_joins_the_execution_with_the_same_parameters(clone: Path) -> None:
+    with pytest.raises(KeyboardInterrupt), tracking.recorded("generate_scenes", PARAMS):
+        raise KeyboardInterrupt
+    assert tracking.sync(PARAMS) == (["generate_scenes"], [])
+    interrupted, synced = children()
+    assert synced.data.tags["mlflow.parentRunId"] == interrupted.data.tags["mlflow.parentRunId"]
+
+
+def test_sync_refuses_what_dvc_did_not_write(clone: Path) -> None:
+    (clone / "reports" / "training" / "place.json").write_text("{}")
+    with pytest.raises(InputError, match=r"place\.json: is not the one that dvc\.lock names"):
+        tracking.sync(PARAMS)
+    (clone / "reports" / "training" / "place.json").unlink()
+    with pytest.raises(InputError, match="made by the stage generate_scenes"):
+        tracking.sync(PARAMS)
+    (clone / "dvc.lock").unlink()
+    with pytest.raises(InputError, match="no stage has run here"):
+        tracking.sync(PARAMS)
+    assert runs() == []
