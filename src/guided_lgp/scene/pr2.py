@@ -139,6 +139,15 @@ MAX_OPENING = finger_opening(FINGER_LIMITS[1])
 """Widest distance of the fingertips (m): 9.0 cm."""
 
 
+GRASP_WIDTH = 0.085
+"""Widest side (m) of a box that the fingers close across."""
+
+
+def grasp_axis(size: tuple[float, float, float]) -> int:
+    """The box axis that the fingers close along: the narrower horizontal one (0: x, 1: y)."""
+    return 0 if size[0] < size[1] else 1
+
+
 def arm_slice(gripper: str) -> slice:
     """Where the joints of the gripper's arm stand in a configuration q."""
     start = 7 * GRIPPERS.index(gripper)
