@@ -1,0 +1,182 @@
+"""Stage enumerate_sequences: all shortest feasible sequences of every configuration.
+
+Each configuration is a shard that its worker writes as soon as it is done, outside the outputs
+that DVC deletes before it starts the stage: after a kill, only the shards in progress are redone.
+The name of a shard is a digest of all that it depends on, the source code included.
+"""
+
+import json
+import logging
+import shutil
+from dataclasses import dataclass
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+import guided_lgp
+from guided_lgp import parallel
+from guided_lgp.experiments.files import write_table
+from guided_lgp.logic import (
+    format_objective,
+    format_skeleton,
+    one_goal_objectives,
+    two_goal_objectives,
+)
+from guided_lgp.nlp.bounds import SceneBounds
+from guided_lgp.nlp.results import CoarseResult
+from guided_lgp.params import BoundsParams, EnumerateSequences, Params
+from guided_lgp.paths import SCENES, SEQUENCES
+from guided_lgp.scene import Scene, load_scenes
+from guided_lgp.search.enumerate import Enumeration, enumerate_sequences
+from guided_lgp.search.observation import observe, start
+
+SPLITS = ("training", "test")
+
+VERDICTS = pa.schema(
+    [
+        ("configuration", pa.string()),
+        ("skeleton", pa.string()),
+        ("length", pa.int32()),
+        ("feasible", pa.bool_()),
+        ("failure_action", pa.int32()),
+        ("failure_constraint", pa.string()),
+        ("failure_violation", pa.float64()),
+        ("states", pa.list_(pa.float64())),
+    ]
+)
+"""``states``: for feasible sequences, positions (length + 1, symbols, 3) in m, flattened; symbols
+in the order grippers, boxes, surfaces; state k: after k actions, the arms retreated."""
+
+SHORTEST = pa.schema(
+    [
+        ("configuration", pa.string()),
+        ("objective", pa.string()),
+        ("symbolic_length", pa.int32()),
+        ("length", pa.int32()),
+    ]
+)
+"""``length``: 0 if the objective holds at the start, null if no sequence was found feasible."""
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Task:
+    """One configuration, and where its shard goes."""
+
+    scene: Scene
+    bounds: BoundsParams
+    limits: EnumerateSequences
+    folder: Path
+
+    @property
+    def shard(self) -> Path:
+        """Folder of the shard; there once it is complete."""
+        content = [
+            self.scene.model_dump(mode="json"),
+            self.bounds.model_dump(),
+            self.limits.model_dump(),
+            _sources(),
+        ]
+        return self.folder / sha256(json.dumps(content).encode()).hexdigest()[:24]
+
+
+def run(params: Params, root: Path) -> None:
+    """Write ``data/sequences/{training,test}.parquet`` and ``{training,test}_shortest.parquet``."""
+    folder = root / SEQUENCES.parent / ".shards"
+    splits = {name: load_scenes(root / SCENES / f"{name}.json").scenes for name in SPLITS}
+    tasks = {
+        name: [Task(scene, params.bounds, params.enumerate_sequences, folder) for scene in scenes]
+        for name, scenes in splits.items()
+    }
+    parallel.run(
+        write_shard,
+        [task for split in tasks.values() for task in split],
+        params.parallel,
+        "enumerate",
+    )
+    for name, split in tasks.items():
+        for part, suffix in (("verdicts", ""), ("shortest", "_shortest")):
+            table = pa.concat_tables(
+                pq.read_table(task.shard / f"{part}.parquet") for task in split
+            )
+            write_table(root / SEQUENCES / f"{name}{suffix}.parquet", table)
+            logger.info("%s %s: %d rows", name, part, len(table))
+    shutil.rmtree(folder)
+
+
+def write_shard(task: Task) -> None:
+    """Enumerate one configuration, unless that has been done before."""
+    if task.shard.exists():
+        return
+    symbols = task.scene.symbols
+    found = enumerate_sequences(
+        task.scene.state,
+        symbols,
+        one_goal_objectives(symbols) + two_goal_objectives(symbols),
+        SceneBounds(task.scene, task.bounds),
+        task.limits.max_length,
+        task.limits.slack,
+    )
+    unfinished = task.shard.with_suffix(".unfinished")
+    write_table(unfinished / "verdicts.parquet", verdict_table(task.scene, found))
+    write_table(unfinished / "shortest.parquet", shortest_table(task.scene, found))
+    unfinished.replace(task.shard)
+
+
+def verdict_table(scene: Scene, found: Enumeration) -> pa.Table:
+    """One row per verdict of the coarse bound."""
+    rows = []
+    for verdict in found.verdicts:
+        failure = verdict.failure
+        known = failure is not None and np.isfinite(failure.violation)
+        rows.append(
+            {
+                "configuration": scene.name,
+                "skeleton": format_skeleton(verdict.skeleton),
+                "length": len(verdict.skeleton),
+                "feasible": verdict.feasible,
+                "failure_action": failure.action if failure else None,
+                "failure_constraint": failure.constraint if failure else None,
+                "failure_violation": failure.violation if failure and known else None,
+                "states": _states(scene, verdict) if verdict.feasible else None,
+            }
+        )
+    return pa.Table.from_pylist(rows, schema=VERDICTS)
+
+
+def shortest_table(scene: Scene, found: Enumeration) -> pa.Table:
+    """One row per objective."""
+    rows = [
+        {
+            "configuration": scene.name,
+            "objective": format_objective(objective),
+            "symbolic_length": found.symbolic[objective],
+            "length": length,
+        }
+        for objective, length in found.shortest.items()
+    ]
+    return pa.Table.from_pylist(rows, schema=SHORTEST)
+
+
+def _states(scene: Scene, verdict: CoarseResult) -> list[float]:
+    keyframes = (start(scene), *verdict.retreated)
+    positions = [list(observe(scene, keyframe).values()) for keyframe in keyframes]
+    flat: list[float] = np.array(positions).ravel().tolist()
+    return flat
+
+
+@cache
+def _sources() -> str:
+    """Digest of the code that a verdict depends on."""
+    package = Path(guided_lgp.__file__).parent
+    digest = sha256()
+    for part in ("logic", "scene", "nlp", "search", "experiments"):
+        for path in sorted((package / part).rglob("*")):
+            if path.suffix in {".py", ".c", ".h"}:
+                digest.update(path.read_bytes())
+    return digest.hexdigest()

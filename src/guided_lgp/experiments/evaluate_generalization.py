@@ -1,0 +1,242 @@
+"""Stage evaluate_generalization: the protocol behind Table I.
+
+Every planner solves every objective of setup a, of one goal and of two, in every test
+configuration. A plan counts as shortest if its length is the shortest feasible length of the
+exhaustive enumeration, which knows the coarse bound only; whether any sequence of that length
+has a path, too, is recorded beside it. Objectives that hold at the start are counted apart.
+"""
+
+import logging
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+
+from guided_lgp import parallel
+from guided_lgp.experiments.files import read_table, write_metrics, write_table
+from guided_lgp.logic import (
+    Objective,
+    Skeleton,
+    format_objective,
+    format_skeleton,
+    one_goal_objectives,
+    parse_skeleton,
+    progress,
+    satisfied,
+    two_goal_objectives,
+)
+from guided_lgp.nlp.bounds import SceneBounds
+from guided_lgp.params import BoundsParams, Params, SearchLimits
+from guided_lgp.paths import EVALUATION, METRICS, SCENES, SEQUENCES, TRAINED
+from guided_lgp.policy.inference import load_policy
+from guided_lgp.policy.split import training_objectives
+from guided_lgp.scene import Scene, load_scenes
+from guided_lgp.search import best_first, guided
+from guided_lgp.search.bounds import Bounds
+from guided_lgp.search.policy import Policy
+from guided_lgp.search.result import SearchResult
+
+Row = dict[str, Any]
+
+PLANNERS: Mapping[str, Callable[..., SearchResult]] = {
+    "default": partial(guided.plan, adapt=False),
+    "adaptation": guided.plan,
+    "best_first": partial(best_first.plan, ordering="cumulative"),
+}
+"""``best_first`` adapts the objective, too."""
+
+OUTCOMES = ("shortest", "feasible", "no_solution")
+
+ROWS = pa.schema(
+    [
+        ("configuration", pa.string()),
+        ("objective", pa.string()),
+        ("unseen", pa.bool_()),
+        ("planner", pa.string()),
+        ("outcome", pa.string()),
+        ("skeleton", pa.string()),
+        ("length", pa.int32()),
+        ("shortest_length", pa.int32()),
+        ("shortest_has_path", pa.bool_()),
+        ("reattempts_infeasible", pa.int32()),
+        ("reattempts_max_depth", pa.int32()),
+        ("tree_size", pa.int32()),
+        ("expansions", pa.int32()),
+        ("policy_calls", pa.int32()),
+        ("coarse_calls", pa.int32()),
+        ("path_calls", pa.int32()),
+        ("reason", pa.string()),
+    ]
+)
+"""``outcome``: trivial, or one of :data:`OUTCOMES`; ``shortest_has_path``: whether any sequence of
+the shortest length has a path, null if there is no such sequence."""
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Task:
+    """All problems of one test configuration."""
+
+    scene: Scene
+    seen: tuple[Objective, ...]
+    shortest: Mapping[str, int | None]
+    """Shortest feasible length by objective."""
+    sequences: tuple[str, ...]
+    """The feasible sequences that the enumeration found."""
+    bounds: BoundsParams
+    limits: SearchLimits
+    models: Path
+
+
+def run(params: Params, root: Path) -> None:
+    """Write ``data/evaluation/generalization.parquet`` and its metrics."""
+    rows = [
+        row
+        for part in parallel.run(evaluate, _tasks(params, root), params.parallel, "generalization")
+        for row in part
+    ]
+    table = pa.Table.from_pylist(rows, schema=ROWS)
+    write_table(root / EVALUATION / "generalization.parquet", table)
+    metrics = summarize(rows)
+    write_metrics(root / METRICS / "generalization.json", metrics)
+    for planner, subsets in metrics.items():
+        shares = ", ".join(f"{name} {figures['shortest']:.1%}" for name, figures in subsets.items())
+        logger.info("%s: shortest: %s", planner, shares)
+
+
+def _tasks(params: Params, root: Path) -> list[Task]:
+    scenes = load_scenes(root / SCENES / "test.json").scenes
+    draw = params.build_dataset
+    seen = training_objectives(scenes[0].symbols, draw.training_objectives, draw.seed)
+    stage = "enumerate_sequences"
+    lengths: dict[str, dict[str, int | None]] = {scene.name: {} for scene in scenes}
+    path = root / SEQUENCES / "test_shortest.parquet"
+    for row in read_table(path, stage, ["configuration", "objective", "length"]):
+        lengths[row["configuration"]][row["objective"]] = row["length"]
+    sequences: dict[str, list[str]] = {scene.name: [] for scene in scenes}
+    path = root / SEQUENCES / "test.parquet"
+    for row in read_table(path, stage, ["configuration", "skeleton", "feasible"]):
+        if row["feasible"]:
+            sequences[row["configuration"]].append(row["skeleton"])
+    return [
+        Task(
+            scene,
+            tuple(seen),
+            lengths[scene.name],
+            tuple(sequences[scene.name]),
+            params.bounds,
+            params.evaluate_generalization,
+            root / TRAINED,
+        )
+        for scene in scenes
+    ]
+
+
+def evaluate(task: Task) -> list[Row]:
+    """Rows of one configuration: every objective by every planner."""
+    symbols = task.scene.symbols
+    bounds = SceneBounds(task.scene, task.bounds)
+    policy = load_policy(task.models)
+    known = [parse_skeleton(text) for text in task.sequences]
+    return [
+        row
+        for objective in one_goal_objectives(symbols) + two_goal_objectives(symbols)
+        for row in _problem(task, objective, bounds, policy, known)
+    ]
+
+
+def _problem(
+    task: Task,
+    objective: Objective,
+    bounds: Bounds,
+    policy: Policy,
+    known: Sequence[Skeleton],
+) -> list[Row]:
+    shortest = task.shortest[format_objective(objective)]
+    problem = {
+        "configuration": task.scene.name,
+        "objective": format_objective(objective),
+        "unseen": objective not in task.seen,
+        "shortest_length": shortest,
+    }
+    if satisfied(task.scene.state, objective):
+        return [problem | {"planner": name, "outcome": "trivial"} for name in PLANNERS]
+    results = {
+        name: plan(task.scene, objective, task.scene.symbols, bounds, policy, task.limits)
+        for name, plan in PLANNERS.items()
+    }
+    found = {len(result.skeleton) for result in results.values() if result.skeleton is not None}
+    has_path = None
+    if shortest is not None:
+        has_path = shortest in found or any(
+            bounds.path(skeleton).feasible
+            for skeleton in known
+            if len(skeleton) == shortest
+            and satisfied(progress(task.scene.state, skeleton), objective)
+        )
+    return [
+        problem | {"planner": name, "shortest_has_path": has_path} | _figures(result, shortest)
+        for name, result in results.items()
+    ]
+
+
+def _figures(result: SearchResult, shortest: int | None) -> Row:
+    skeleton = result.skeleton
+    length = len(skeleton) if skeleton is not None else None
+    outcome = "no_solution"
+    if length is not None:
+        outcome = "shortest" if length == shortest else "feasible"
+    return {
+        "outcome": outcome,
+        "skeleton": format_skeleton(skeleton) if skeleton is not None else None,
+        "length": length,
+        "reattempts_infeasible": result.reattempts["infeasible"],
+        "reattempts_max_depth": result.reattempts["max_depth"],
+        "tree_size": result.tree_size,
+        "expansions": result.expansions,
+        "policy_calls": result.policy_calls,
+        "coarse_calls": result.coarse_calls,
+        "path_calls": result.path_calls,
+        "reason": result.reason,
+    }
+
+
+def summarize(rows: Sequence[Row]) -> dict[str, dict[str, dict[str, float | int]]]:
+    """Table I: planner, then all or unseen objectives, then figures.
+
+    ``n`` problems do not hold at the start, a share ``trivial`` of all problems does. The other
+    figures are shares of n: the outcomes; problems with at least one reattempt for a cause;
+    ``unsolvable``, for which the enumeration found no feasible sequence; and
+    ``shortest_without_path``, where no sequence of the shortest length has a path.
+    """
+    return {
+        planner: {
+            subset: _shares(
+                [row for row in rows if row["planner"] == planner and (row["unseen"] or not only)]
+            )
+            for subset, only in (("all", False), ("unseen", True))
+        }
+        for planner in PLANNERS
+    }
+
+
+def _shares(rows: Sequence[Row]) -> dict[str, float | int]:
+    counted = [row for row in rows if row["outcome"] != "trivial"]
+
+    def share(holds: Callable[[Row], bool]) -> float:
+        return sum(map(holds, counted)) / max(len(counted), 1)
+
+    outcomes = [row["outcome"] for row in counted]
+    return {
+        "n": len(counted),
+        "trivial": (len(rows) - len(counted)) / max(len(rows), 1),
+        **{name: outcomes.count(name) / max(len(counted), 1) for name in OUTCOMES},
+        "reattempt_infeasible": share(lambda row: row["reattempts_infeasible"] > 0),
+        "reattempt_max_depth": share(lambda row: row["reattempts_max_depth"] > 0),
+        "unsolvable": share(lambda row: row["shortest_length"] is None),
+        "shortest_without_path": share(lambda row: row["shortest_has_path"] is False),
+    }

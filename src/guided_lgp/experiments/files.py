@@ -1,0 +1,55 @@
+"""Tables and metrics on disk: written whole or not at all, refused if of another version."""
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from guided_lgp.errors import InputError
+
+_VERSION = b"1"
+_KEY = b"guided_lgp"
+
+
+def write_table(path: Path, table: pa.Table) -> None:
+    """Write a Parquet file: under a temporary name, then renamed."""
+    stamped = table.replace_schema_metadata({_KEY: _VERSION})
+    path.parent.mkdir(parents=True, exist_ok=True)
+    unfinished = path.with_name(f".{path.name}.unfinished")
+    pq.write_table(stamped, unfinished)
+    unfinished.replace(path)
+
+
+def read_table(path: Path, stage: str, columns: Sequence[str]) -> list[dict[str, Any]]:
+    """Read columns of a Parquet file as one dictionary per row.
+
+    Args:
+        path: the file.
+        stage: the stage that makes it, for the message.
+        columns: those wanted.
+
+    Raises:
+        InputError: the file is missing, damaged or of another version.
+    """
+    remedy = f"the output of stage {stage}"
+    try:
+        version = (pq.read_schema(path).metadata or {}).get(_KEY)
+        if version != _VERSION:
+            raise InputError(str(path), "is of another version", remedy)
+        rows: list[dict[str, Any]] = pq.read_table(path, columns=list(columns)).to_pylist()
+    except InputError:
+        raise
+    except (OSError, ValueError, KeyError) as error:
+        fault = "is missing" if isinstance(error, FileNotFoundError) else "cannot be read"
+        raise InputError(str(path), fault, remedy) from None
+    return rows
+
+
+def write_metrics(path: Path, metrics: Mapping[str, Any]) -> None:
+    """Write metrics as JSON, the same bytes for the same figures."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    text = json.dumps(metrics, indent=1, allow_nan=False)
+    path.write_text(text + "\n", encoding="utf-8")

@@ -1,0 +1,25 @@
+"""Stage generate_scenes: configurations for training, test and scalability."""
+
+import logging
+from pathlib import Path
+
+from guided_lgp.params import Params
+from guided_lgp.paths import SCENES
+from guided_lgp.scene import generate
+
+logger = logging.getLogger(__name__)
+
+
+def run(params: Params, root: Path) -> None:
+    """Write ``data/scenes/*.json``; the seeds of the three purposes are separate."""
+    settings = params.generate_scenes
+    wanted = [
+        ("training", "a", settings.training_configurations, settings.seed_training),
+        ("test", "a", settings.test_configurations, settings.seed_test),
+    ]
+    count, seed = settings.scalability_configurations, settings.seed_scalability
+    wanted += [(f"scalability_{setup}", setup, count, seed) for setup in "abcd"]
+    for name, setup, number, stream in wanted:
+        scenes = generate(setup, number, stream, name.replace("_", "-"))
+        scenes.save(root / SCENES / f"{name}.json")
+        logger.info("%s: %d configurations, %d rejected", name, number, scenes.rejected)

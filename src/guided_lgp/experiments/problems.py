@@ -1,0 +1,80 @@
+"""The scalability problems of Table II, with their objectives spelled out (DESIGN §6)."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations, pairwise, permutations, product
+
+from guided_lgp.logic import Goal, Objective, Symbols
+
+Boxes = Sequence[str]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A row of Table II."""
+
+    name: str
+    setup: str
+    target: str
+    k_min: int
+    """Least number of actions, by the logic alone."""
+    objectives: Callable[[Boxes], list[Objective]]
+    """The objectives, given the boxes of the setup."""
+    reduced: bool = False
+    """Starred in the paper: planners without a policy get fewer tables."""
+
+    def unguided_symbols(self, symbols: Symbols) -> Symbols:
+        """The symbols for planners without a policy."""
+        if not self.reduced:
+            return symbols
+        return replace(symbols, surfaces=("tray", "tab2"), box_is_table=False)
+
+
+def tower(boxes: Boxes, table: str | None = None) -> Objective:
+    """Boxes on each other, the first one at the top; the last one on a table, if given."""
+    goals = [Goal("on", upper, lower) for upper, lower in pairwise(boxes)]
+    return tuple(goals if table is None else [*goals, Goal("on", boxes[-1], table)])
+
+
+def _stacks_of_three(boxes: Boxes) -> list[Objective]:
+    """The ordered towers, and two boxes beside each other on the third."""
+    pairs = [
+        (Goal("on", first, below), Goal("on", second, below))
+        for below in boxes
+        for first, second in combinations([box for box in boxes if box != below], 2)
+    ]
+    return [tower(order) for order in permutations(boxes)] + pairs
+
+
+def _towers_on_tray(boxes: Boxes) -> list[Objective]:
+    """Six orders, evenly spread over all of them."""
+    orders = list(permutations(boxes))
+    return [tower(order, "tray") for order in orders[:: len(orders) // 6]]
+
+
+def _spread(boxes: Boxes, on_tray: Sequence[str]) -> Objective:
+    return tuple(Goal("on", box, "tray" if box in on_tray else "tab2") for box in boxes)
+
+
+def _every_assignment(boxes: Boxes) -> list[Objective]:
+    return [
+        tuple(Goal("on", box, table) for box, table in zip(boxes, tables, strict=True))
+        for tables in product(("tray", "tab2"), repeat=len(boxes))
+    ]
+
+
+def _two_on_tray(boxes: Boxes) -> list[Objective]:
+    """Two boxes on the tray, the others on tab2: six choices, evenly spread over all."""
+    pairs = list(combinations(boxes, 2))
+    return [_spread(boxes, pairs[index * len(pairs) // 6]) for index in range(6)]
+
+
+PROBLEMS = (
+    Problem("a.1", "a", "stack boxes on table", 4, _stacks_of_three),
+    Problem("b.1", "b", "place boxes on tray/tab2", 6, _every_assignment, reduced=True),
+    Problem("b.2", "b", "stack boxes on tray", 6, _towers_on_tray),
+    Problem("c.1", "c", "place boxes on tray/tab2", 8, _two_on_tray, reduced=True),
+    Problem("c.2", "c", "stack boxes on tray", 8, _towers_on_tray),
+    Problem("d.1", "d", "place boxes on tray/tab2", 10, _two_on_tray, reduced=True),
+    Problem("d.2", "d", "stack boxes on tray", 10, _towers_on_tray),
+)
