@@ -1,1 +1,1 @@
-"""."""
+"""The hierarchical policy: encoding, data set, networks, training and inference."""

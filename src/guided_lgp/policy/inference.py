@@ -1,0 +1,106 @@
+"""The trained policy: a probability over high-level actions (paper, Sec. II-A)."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from guided_lgp.errors import InputError
+from guided_lgp.logic import Action, Objective, State, Symbols
+from guided_lgp.policy.encoding import CHAINS, INSTRUCTIONS, Encoding, FloatArray
+from guided_lgp.policy.models import Layers, Model, load_model
+from guided_lgp.scene import GRIPPERS
+
+FLOOR = np.log(1e-6)
+"""Log-probability of an action on a symbol that fills no slot: the networks cannot see it, and a
+complete search must be able to take it."""
+
+
+class HierarchicalPolicy:
+    """Instruction policy, and one classifier chain per instruction.
+
+    p(action) = p(instruction) · p(gripper | instruction) · p(box | gripper) [· p(table | gripper,
+    box)], each given (g, s_k). Over all actions on the slots this sums to 1.
+    """
+
+    def __init__(self, models: Mapping[str, Model]) -> None:
+        self._chains = {network: tuple(m.sub_policies.values()) for network, m in models.items()}
+        self.encoding: Encoding = models["instruction"].encoding
+
+    def log_probabilities(
+        self,
+        objective: Objective,
+        state: State,
+        positions: Mapping[str, NDArray[np.float64]],
+        actions: Sequence[Action],
+    ) -> NDArray[np.float64]:
+        """Score applicable actions; see :class:`guided_lgp.search.policy.Policy`.
+
+        The order of ``positions`` is the order in which the symbols are declared, which decides
+        about their slots.
+        """
+        boxes = {name for name, _ in state.support + state.held}
+        symbols = Symbols(
+            grippers=GRIPPERS,
+            boxes=tuple(name for name in positions if name in boxes),
+            surfaces=tuple(name for name in positions if name not in {*GRIPPERS, *boxes}),
+        )
+        slots = self.encoding.fill(objective, state, symbols)
+        code = np.concatenate(
+            [self.encoding.encode_goals(slots), self.encoding.encode_state(slots, positions)]
+        )
+        instruction = _log_softmax(_forward(self._chains["instruction"][0], code[None]))[0]
+        joint = {name: self._joint(name, code) for name in INSTRUCTIONS}
+        scores = np.full(len(actions), FLOOR)
+        for row, action in enumerate(actions):
+            classes = self.encoding.encode_action(slots, action)
+            if classes is not None:
+                chosen = tuple(index for index in classes[1:] if index >= 0)
+                scores[row] = instruction[classes[0]] + joint[action.instruction][chosen]
+        return scores
+
+    def _joint(self, network: str, code: FloatArray) -> NDArray[np.float32]:
+        """Log-probability of every choice of symbols, one axis per sub-policy of the chain."""
+        inputs = code[None]
+        log_p = np.zeros(1, dtype=np.float32)
+        shape = []
+        for layers in self._chains[network]:
+            conditional = _log_softmax(_forward(layers, inputs))
+            count, classes = conditional.shape
+            log_p = (log_p[:, None] + conditional).ravel()
+            decisions = np.tile(np.eye(classes, dtype=np.float32), (count, 1))
+            inputs = np.concatenate([np.repeat(inputs, classes, axis=0), decisions], axis=1)
+            shape.append(classes)
+        return log_p.reshape(shape)
+
+
+def load_policy(directory: Path) -> HierarchicalPolicy:
+    """Read the three networks; torch is not needed.
+
+    Raises:
+        InputError: a file is missing, damaged, of another version, or the networks were trained
+            with different encodings; the message names the stage that makes them.
+    """
+    models = {network: load_model(directory, network) for network in CHAINS}
+    if len({model.encoding for model in models.values()}) > 1:
+        raise InputError(
+            str(directory),
+            "the networks were trained with different encodings",
+            "models of one run of the stage train_policy",
+        )
+    return HierarchicalPolicy(models)
+
+
+def _forward(layers: Layers, inputs: FloatArray) -> FloatArray:
+    for weight, bias in layers[:-1]:
+        inputs = np.maximum(inputs @ weight.T + bias, 0)
+    weight, bias = layers[-1]
+    logits: FloatArray = inputs @ weight.T + bias
+    return logits
+
+
+def _log_softmax(logits: FloatArray) -> FloatArray:
+    shifted: FloatArray = logits - logits.max(axis=-1, keepdims=True)
+    log_p: FloatArray = shifted - np.log(np.exp(shifted).sum(axis=-1, keepdims=True))
+    return log_p

@@ -1,0 +1,105 @@
+"""The files of a trained network: safetensors for the weights, JSON for what they mean."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from safetensors import SafetensorError
+from safetensors.numpy import load_file, save_file
+
+from guided_lgp.errors import InputError
+from guided_lgp.policy.encoding import CHAINS, VERSION, Encoding, FloatArray
+
+_STAGE = "train_policy"
+
+Layers = tuple[tuple[FloatArray, FloatArray], ...]
+"""Weight (outputs, inputs) and bias (outputs,) of every layer of a sub-policy."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """A trained network: its sub-policies in the order of the chain, and their encoding."""
+
+    network: str
+    encoding: Encoding
+    sub_policies: Mapping[str, Layers]
+    training: Mapping[str, Any]
+    """Settings and seeds that it was trained with."""
+
+    def save(self, directory: Path) -> None:
+        """Write ``<network>.safetensors`` and ``<network>.json``; same model, same bytes."""
+        directory.mkdir(parents=True, exist_ok=True)
+        tensors = {}
+        for name, layers in self.sub_policies.items():
+            for index, (weight, bias) in enumerate(layers):
+                tensors[f"{name}.{index}.weight"] = weight
+                tensors[f"{name}.{index}.bias"] = bias
+        document = {
+            "version": VERSION,
+            "network": self.network,
+            "sub_policies": {
+                name: [layers[0][0].shape[1], *(len(bias) for _, bias in layers)]
+                for name, layers in self.sub_policies.items()
+            },
+            "activation": "relu",
+            "training": self.training,
+            "encoding": self.encoding.document(),
+        }
+        save_file(tensors, directory / f"{self.network}.safetensors")
+        text = json.dumps(document, indent=1)
+        (directory / f"{self.network}.json").write_text(text + "\n", encoding="utf-8")
+
+
+def load_model(directory: Path, network: str) -> Model:
+    """Read what :meth:`Model.save` wrote.
+
+    Raises:
+        InputError: a file is missing, damaged, of another version or for another encoding.
+    """
+    path = directory / f"{network}.json"
+    remedy = f"version {VERSION}, the output of the stage {_STAGE}"
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+        version = document["version"]
+    except (OSError, ValueError, TypeError, KeyError) as error:
+        fault = "is missing" if isinstance(error, FileNotFoundError) else "is damaged"
+        raise InputError(str(path), fault, remedy) from None
+    if version != VERSION:
+        raise InputError(f"{path}: version", f"is {version!r}", remedy)
+    encoding = Encoding.parse(document.get("encoding"), str(path), _STAGE)
+    sizes = _sizes(document, network, encoding)
+    if sizes is None:
+        raise InputError(f"{path}: sub_policies", "do not fit the network's chain", remedy)
+    path = directory / f"{network}.safetensors"
+    try:
+        tensors = load_file(path)
+    except (OSError, SafetensorError) as error:
+        fault = "is missing" if isinstance(error, FileNotFoundError) else "is damaged"
+        raise InputError(str(path), fault, remedy) from None
+    sub_policies = {}
+    for name, widths in sizes.items():
+        layers = []
+        for index, shape in enumerate(zip(widths[1:], widths[:-1], strict=True)):
+            weight = tensors.get(f"{name}.{index}.weight")
+            bias = tensors.get(f"{name}.{index}.bias")
+            if weight is None or bias is None or weight.shape != shape or len(bias) != shape[0]:
+                fault = f"does not have the {shape[0]} × {shape[1]} weights that its JSON names"
+                raise InputError(f"{path}: {name}.{index}", fault, remedy)
+            layers.append((weight, bias))
+        sub_policies[name] = tuple(layers)
+    return Model(network, encoding, sub_policies, document["training"])
+
+
+def _sizes(document: Any, network: str, encoding: Encoding) -> dict[str, list[int]] | None:
+    """Layer sizes of each sub-policy, or None if they do not fit the chain."""
+    try:
+        sizes = {name: list(map(int, document["sub_policies"][name])) for name in CHAINS[network]}
+        ends = [(widths[0], widths[-1]) for widths in sizes.values()]
+        document["training"]
+    except (KeyError, IndexError, TypeError, ValueError):
+        return None
+    classes = [encoding.classes(name) for name in CHAINS[network]]
+    expected = list(zip(encoding.chain_inputs(network), classes, strict=True))
+    return sizes if ends == expected and document.get("network") == network else None

@@ -1,0 +1,217 @@
+"""Collects the training samples from the enumerated sequences (paper, Appendix; DESIGN §5)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import permutations
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from guided_lgp.errors import InputError
+from guided_lgp.logic import (
+    Objective,
+    Skeleton,
+    State,
+    Symbols,
+    format_objective,
+    parse_skeleton,
+    satisfied,
+    successor,
+)
+from guided_lgp.policy.dataset import Dataset
+from guided_lgp.policy.encoding import Encoding, FloatArray, Slots
+from guided_lgp.scene import Scene
+
+_ENUMERATION = "the output of the stage enumerate_sequences for the same scenes"
+
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.int64]
+
+
+def build_dataset(
+    scenes: Sequence[Scene],
+    sequences: Path,
+    shortest: Path,
+    objectives: Sequence[Objective],
+    slack: int,
+) -> Dataset:
+    """Collect the samples of the training configurations and objectives.
+
+    For every configuration and objective these are the coarse-feasible sequences that reach the
+    objective with their last action, of the shortest feasible length or up to ``slack`` longer.
+    Each step is a sample, once for each order of the goals.
+
+    Args:
+        scenes: the training configurations; they share their symbols.
+        sequences: Parquet file of verdicts and states, written by enumerate_sequences.
+        shortest: Parquet file of the shortest feasible lengths, from the same stage.
+        objectives: the training objectives.
+        slack: extra actions.
+
+    Raises:
+        InputError: a file is missing or does not fit the scenes; no sample results.
+    """
+    encoding = Encoding()
+    symbols = _common_symbols(scenes, encoding)
+    lengths = _shortest_lengths(shortest, scenes, objectives)
+    verdicts = _read(sequences, ["configuration", "skeleton", "feasible", "states"])
+    feasible = verdicts[verdicts["feasible"].astype(bool)]
+    rows_of = {str(name): rows for name, rows in feasible.groupby("configuration")}
+
+    states, actions, configuration = [], [], []
+    sample_state, sample_objective = [], []
+    first = 0
+    for index, scene in enumerate(scenes):
+        rows = rows_of.get(scene.name, feasible.iloc[:0])
+        paths = _feasible_sequences(scene, rows, symbols, encoding, str(sequences))
+        step, objective = np.nonzero(
+            _wanted(paths, objectives, lengths[index], slack)[paths.sequence]
+        )
+        sample_state.append(first + step)
+        sample_objective.append(objective)
+        states.append(paths.states)
+        actions.append(paths.actions)
+        configuration.append(np.full(len(paths.states), index, dtype=np.int16))
+        first += len(paths.states)
+
+    state_of, objective_of = np.concatenate(sample_state), np.concatenate(sample_objective)
+    if not state_of.size:
+        raise InputError(
+            str(sequences), "no training objective has a feasible sequence", _ENUMERATION
+        )
+    goals, order_of = _encode_orders(objectives, scenes[0], encoding)
+    pairs = [(state_of[objective_of == index], rows) for index, rows in enumerate(order_of)]
+    return Dataset(
+        encoding=encoding,
+        symbols=symbols,
+        objectives=tuple(objectives),
+        configurations=tuple(scene.name for scene in scenes),
+        states=np.concatenate(states),
+        actions=np.concatenate(actions),
+        configuration=np.concatenate(configuration),
+        goals=goals,
+        sample_state=np.concatenate(
+            [np.tile(members, len(rows)) for members, rows in pairs]
+        ).astype(np.int32),
+        sample_goals=np.concatenate(
+            [np.repeat(rows, len(members)) for members, rows in pairs]
+        ).astype(np.int32),
+    )
+
+
+@dataclass(frozen=True)
+class _Sequences:
+    """The feasible sequences of one configuration; the steps of all, one after another."""
+
+    progress: list[tuple[State, ...]]
+    """Symbolic states 0 to K of each sequence."""
+    sequence: IntArray
+    """(M,) the sequence that each step belongs to."""
+    states: FloatArray
+    """(M, state_size) encoded states s_k before each step."""
+    actions: NDArray[np.int8]
+    """(M, 4) classes of each step's action."""
+
+
+def _feasible_sequences(
+    scene: Scene, rows: pd.DataFrame, symbols: Symbols, encoding: Encoding, where: str
+) -> _Sequences:
+    slots = encoding.fill((), scene.state, symbols)
+    known: dict[Skeleton, tuple[State, ...]] = {(): (scene.state,)}
+
+    def progress(skeleton: Skeleton) -> tuple[State, ...]:
+        if skeleton not in known:
+            before = progress(skeleton[:-1])
+            known[skeleton] = (*before, successor(before[-1], skeleton[-1]))
+        return known[skeleton]
+
+    skeletons = [parse_skeleton(text) for text in rows["skeleton"]]
+    states = [np.zeros((0, encoding.state_size), dtype=np.float32)]
+    for skeleton, flat in zip(skeletons, rows["states"], strict=True):
+        size = (len(skeleton) + 1) * encoding.state_size
+        if flat is None or len(flat) != size:
+            raise InputError(where, f"states of {scene.name}: not {size} numbers", _ENUMERATION)
+        states.append(np.asarray(flat, np.float32).reshape(-1, encoding.state_size)[:-1])
+    classes = [encoding.encode_action(slots, action) for path in skeletons for action in path]
+    return _Sequences(
+        progress=[progress(skeleton) for skeleton in skeletons],
+        sequence=np.repeat(np.arange(len(skeletons)), [len(path) for path in skeletons]),
+        states=np.concatenate(states),
+        actions=np.array(classes, dtype=np.int8).reshape(-1, 4),
+    )
+
+
+def _wanted(
+    paths: _Sequences, objectives: Sequence[Objective], shortest: FloatArray, slack: int
+) -> BoolArray:
+    """(sequences, objectives): reaches the objective with its last action, and is short enough."""
+    holds: dict[State, BoolArray] = {}
+    for state in {state for states in paths.progress for state in states}:
+        holds[state] = np.array([satisfied(state, objective) for objective in objectives])
+    wanted = np.zeros((len(paths.progress), len(objectives)), dtype=bool)
+    for row, states in enumerate(paths.progress):
+        length = len(states) - 1
+        wanted[row] = holds[states[-1]] & (shortest <= length) & (length <= shortest + slack)
+        for state in states[:-1]:
+            wanted[row] &= ~holds[state]
+    return wanted
+
+
+def _encode_orders(
+    objectives: Sequence[Objective], scene: Scene, encoding: Encoding
+) -> tuple[FloatArray, list[IntArray]]:
+    """Each objective encoded in every order of its goals, and the rows of each objective."""
+    slots = encoding.fill((), scene.state, scene.symbols)
+    orders = [list(permutations(objective)) for objective in objectives]
+    codes = [
+        encoding.encode_goals(Slots(slots.grippers, slots.boxes, slots.surfaces, goals))
+        for variants in orders
+        for goals in variants
+    ]
+    ends = np.cumsum([len(variants) for variants in orders])
+    rows = [np.arange(end - len(part), end) for end, part in zip(ends, orders, strict=True)]
+    return np.array(codes), rows
+
+
+def _common_symbols(scenes: Sequence[Scene], encoding: Encoding) -> Symbols:
+    symbols = scenes[0].symbols
+    for scene in scenes:
+        if scene.symbols != symbols:
+            raise InputError(
+                f"scene {scene.name}",
+                "has other symbols than the first training configuration",
+                "training configurations with the same symbols",
+            )
+    counts = (len(symbols.grippers), len(symbols.boxes), len(symbols.surfaces))
+    if counts != (encoding.grippers, encoding.boxes, encoding.surfaces):
+        raise InputError(
+            f"scene {scenes[0].name}",
+            "{} grippers, {} boxes, {} tables".format(*counts),
+            f"{encoding.grippers}, {encoding.boxes} and {encoding.surfaces} for training",
+        )
+    return symbols
+
+
+def _shortest_lengths(
+    path: Path, scenes: Sequence[Scene], objectives: Sequence[Objective]
+) -> FloatArray:
+    """(scenes, objectives) shortest feasible lengths; NaN where there is none."""
+    table = _read(path, ["configuration", "objective", "length"])
+    lengths = table.set_index(["configuration", "objective"])["length"]
+    names = [scene.name for scene in scenes]
+    texts = [format_objective(objective) for objective in objectives]
+    wanted = pd.MultiIndex.from_product([names, texts])
+    for name, text in wanted[~wanted.isin(lengths.index)]:
+        raise InputError(str(path), f"lacks {name} {text}", _ENUMERATION)
+    values: FloatArray = lengths.loc[wanted].to_numpy(dtype=np.float32, na_value=np.nan)
+    return values.reshape(len(names), len(texts))
+
+
+def _read(path: Path, columns: list[str]) -> pd.DataFrame:
+    try:
+        return pd.read_parquet(path, columns=columns)
+    except (OSError, ValueError) as error:
+        fault = " ".join(str(error).split())
+        raise InputError(str(path), f"cannot be read: {fault}", _ENUMERATION) from None

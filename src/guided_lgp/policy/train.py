@@ -1,0 +1,197 @@
+"""Trains a network: its sub-policies, side by side (paper, Sec. II-A and Appendix)."""
+
+import json
+import logging
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from guided_lgp.errors import InputError
+from guided_lgp.parallel import run
+from guided_lgp.params import Network, Parallel, TrainPolicy
+from guided_lgp.policy.dataset import Dataset
+from guided_lgp.policy.encoding import CHAINS
+from guided_lgp.policy.models import Model
+from guided_lgp.policy.training import Fit, fit
+
+if TYPE_CHECKING:
+    from lightning.pytorch.loggers import Logger
+
+LoggerFactory = Callable[[str], "Logger | None"]
+"""Makes the logger of one learning curve, given its name such as ``place.box.random``."""
+
+SPLITS = ("random", "configuration")
+"""How validation samples are chosen. The paper's random choice decides about the weights that are
+saved; since it puts copies and neighbours of a sample on both sides, the same training is repeated
+with whole configurations held out, for the report alone."""
+
+BoolArray = NDArray[np.bool_]
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class TrainingReport:
+    """What came out of training one network."""
+
+    network: str
+    seed: int
+    samples: int
+    """Of this network, training and validation."""
+    sub_policies: Mapping[str, Mapping[str, Any]]
+    """By sub-policy: accuracy and loss (nats) on validation at the best epoch, epochs trained,
+    best epoch, curves, confusion; the same under ``by_configuration`` for that split."""
+
+    def document(self) -> dict[str, Any]:
+        """The JSON document of the report."""
+        return {
+            "version": 1,
+            "network": self.network,
+            "seed": self.seed,
+            "samples": self.samples,
+            "sub_policies": self.sub_policies,
+        }
+
+    def save(self, path: Path) -> None:
+        """Write the report as JSON."""
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(self.document(), indent=1) + "\n", encoding="utf-8")
+
+
+@dataclass(frozen=True)
+class _Task:
+    network: str
+    sub_policy: str
+    split: str
+    dataset: Dataset
+    validation: BoolArray
+    """(N,) the samples of the data set that are for validation."""
+    settings: Network
+    patience: int
+    seed: np.random.SeedSequence
+    logger_factory: LoggerFactory
+
+    @property
+    def name(self) -> str:
+        return f"{self.network}.{self.sub_policy}.{self.split}"
+
+
+def train_network(
+    network: str,
+    dataset: Dataset,
+    settings: TrainPolicy,
+    parallel: Parallel,
+    directory: Path,
+    logger_factory: LoggerFactory,
+) -> TrainingReport:
+    """Train the sub-policies of a network and save it.
+
+    Args:
+        network: ``instruction``, ``grasp`` or ``place``.
+        dataset: the training samples.
+        settings: of training (paper, Table IV).
+        parallel: back end and workers; the result does not depend on them.
+        directory: for ``<network>.safetensors`` and ``<network>.json``.
+        logger_factory: picklable, called in the worker.
+
+    Raises:
+        InputError: too few samples to split, or a training that diverges at once.
+    """
+    own: Network = getattr(settings, network)
+    samples = dataset.of_network(network)
+    tasks = [
+        _Task(
+            network=network,
+            sub_policy=sub_policy,
+            split=split,
+            dataset=dataset,
+            validation=_validation(dataset, split, settings),
+            settings=own,
+            patience=settings.patience,
+            seed=np.random.SeedSequence([settings.seed, list(CHAINS).index(network), index]),
+            logger_factory=logger_factory,
+        )
+        for split in SPLITS
+        for index, sub_policy in enumerate(CHAINS[network])
+    ]
+    for task in tasks:
+        held_out = np.count_nonzero(task.validation[samples])
+        if not 0 < held_out < len(samples):
+            raise InputError(
+                "train_policy.validation_share",
+                f"{held_out} of {len(samples)} samples of the network {network} for validation "
+                f"(split: {task.split})",
+                "a share that leaves samples on both sides; or more configurations",
+            )
+    fits = run(_train, tasks, parallel, f"training {network}")
+    results = {(task.split, task.sub_policy): f for task, f in zip(tasks, fits, strict=True)}
+    Model(
+        network=network,
+        encoding=dataset.encoding,
+        sub_policies={name: results["random", name].layers for name in CHAINS[network]},
+        training={"seed": settings.seed, "samples": len(samples), **own.model_dump()},
+    ).save(directory)
+    return TrainingReport(
+        network=network,
+        seed=settings.seed,
+        samples=len(samples),
+        sub_policies={
+            name: {
+                "classes": dataset.class_names(name),
+                **_figures(results["random", name]),
+                "by_configuration": _figures(results["configuration", name]),
+            }
+            for name in CHAINS[network]
+        },
+    )
+
+
+def _train(task: _Task) -> Fit:
+    samples = task.dataset.of_network(task.network)
+    held_out = task.validation[samples]
+    result = fit(
+        training=task.dataset.tensors(task.network, task.sub_policy, samples[~held_out]),
+        validation=task.dataset.tensors(task.network, task.sub_policy, samples[held_out]),
+        classes=task.dataset.encoding.classes(task.sub_policy),
+        settings=task.settings,
+        patience=task.patience,
+        seed=task.seed,
+        logger=task.logger_factory(task.name),
+    )
+    best = result.best_epoch - 1
+    logger.info(
+        "%s: validation loss %.3f, accuracy %.3f at epoch %d of %d",
+        task.name,
+        result.curves["validation_loss"][best],
+        result.curves["validation_accuracy"][best],
+        result.best_epoch,
+        len(result.curves["validation_loss"]),
+    )
+    return result
+
+
+def _validation(dataset: Dataset, split: str, settings: TrainPolicy) -> BoolArray:
+    """(N,) the samples held out; the same ones for every network."""
+    rng = np.random.default_rng(np.random.SeedSequence([settings.seed, SPLITS.index(split)]))
+    units = len(dataset) if split == "random" else len(dataset.configurations)
+    chosen = np.zeros(units, dtype=bool)
+    chosen[rng.permutation(units)[: max(1, round(settings.validation_share * units))]] = True
+    if split == "random":
+        return chosen
+    return chosen[dataset.configuration[dataset.sample_state]]
+
+
+def _figures(result: Fit) -> dict[str, Any]:
+    curves = result.curves
+    return {
+        "accuracy": curves["validation_accuracy"][result.best_epoch - 1],
+        "loss": curves["validation_loss"][result.best_epoch - 1],
+        "epochs": len(curves["validation_loss"]),
+        "best_epoch": result.best_epoch,
+        "confusion": result.confusion.tolist(),
+        "curves": curves,
+    }
