@@ -1,8 +1,4 @@
-"""Names and colours that tables, figures, pages and replays share."""
-
-import zlib
-
-from matplotlib.colors import to_rgb
+"""Names and colours that tables, figures and pages share."""
 
 PLANNERS = {
     "breadth_first": "Breadth-first",
@@ -43,28 +39,3 @@ VARIANTS = {
 
 NETWORKS = {"instruction": "μ_ins", "grasp": "μ_grasp", "place": "μ_place"}
 """The three networks of the hierarchical policy."""
-
-_BOX_COLORS = {
-    "red": "#C8443C",
-    "green": "#4C9A50",
-    "blue": "#3D6FB6",
-    "yellow": "#E3B93C",
-    "orange": "#E08A3C",
-    "purple": "#8A63A8",
-    "pink": "#D98BA8",
-    "cyan": "#4FA9B5",
-    "white": "#EDEDED",
-    "black": "#333333",
-}
-
-
-def box_color(name: str) -> str:
-    """The colour of a box: the one it is named after, or one chosen by its name."""
-    palette = list(_BOX_COLORS.values())
-    return _BOX_COLORS.get(name, palette[zlib.crc32(name.encode()) % len(palette)])
-
-
-def box_rgb(name: str) -> tuple[int, int, int]:
-    """:func:`box_color` as three numbers from 0 to 255."""
-    red, green, blue = (round(255 * channel) for channel in to_rgb(box_color(name)))
-    return red, green, blue

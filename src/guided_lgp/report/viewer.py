@@ -9,7 +9,6 @@ import numpy as np
 import pinocchio
 import viser
 
-from guided_lgp.report.style import box_rgb
 from guided_lgp.scene.model import Scene
 from guided_lgp.scene.poses import Array, compose, pose
 from guided_lgp.scene.pr2 import (
@@ -19,12 +18,10 @@ from guided_lgp.scene.pr2 import (
     base_pose,
     urdf_path,
 )
+from guided_lgp.scene.world import COLOURS, TABLE_THICKNESS
 
-_SHELL = (228, 228, 226)
-_HAND = (120, 124, 130)
-_TABLE = (206, 191, 168)
-_TRAY = (140, 142, 146)
-_THICKNESS = 0.02
+_SHELL, _HAND = (0.89, 0.89, 0.88), (0.47, 0.48, 0.51)
+_OTHER_BOX, _OTHER_TABLE = (0.25, 0.65, 0.68), (0.81, 0.75, 0.66)
 
 
 class Viewer:
@@ -95,8 +92,8 @@ class Viewer:
         scene.add_grid("/floor", 4.0, 4.0, cell_size=0.5, section_size=1.0)
         camera = self.server.initial_camera
         camera.position = (2.1, -0.8, 1.75)
-        camera.look_at = (0.35, 0.05, 0.7)
-        camera.fov = 0.7
+        camera.look_at = (0.35, 0.0, 0.8)
+        camera.fov = 0.75
 
     def _add_robot(self) -> None:
         scene = self.server.scene
@@ -123,7 +120,9 @@ class Viewer:
             scene.add_mesh_simple(
                 f"{paths[visual.parentJoint]}/{visual.name}",
                 np.asarray(mesh.vertices()),
-                np.array([[mesh.tri_indices(i)[k] for k in range(3)] for i in range(mesh.num_tris)]),
+                np.array(
+                    [[mesh.tri_indices(i)[k] for k in range(3)] for i in range(mesh.num_tris)]
+                ),
                 color=_HAND if hand else _SHELL,
                 flat_shading=True,
                 **_pose(np.array(pinocchio.SE3ToXYZQUAT(visual.placement))),
@@ -135,15 +134,15 @@ class Viewer:
             x, y, top = table.position
             scene.add_box(
                 f"/tables/{table.name}",
-                _TRAY if table.name == "tray" else _TABLE,
-                (2 * table.half_extents[0], 2 * table.half_extents[1], _THICKNESS),
+                COLOURS.get(table.name, _OTHER_TABLE),
+                (2 * table.half_extents[0], 2 * table.half_extents[1], TABLE_THICKNESS),
                 cast_shadow=False,
-                **_pose(pose((x, y, top - _THICKNESS / 2), table.yaw)),
+                **_pose(pose((x, y, top - TABLE_THICKNESS / 2), table.yaw)),
             )
         for box in self.scene.boxes:
             self._boxes[box.name] = scene.add_box(
                 f"/boxes/{box.name}",
-                box_rgb(box.name),
+                COLOURS.get(box.name, _OTHER_BOX),
                 box.size,
                 **_pose(pose(box.position, box.yaw)),
             )

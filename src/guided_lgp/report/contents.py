@@ -1,0 +1,142 @@
+"""The report's sections: which table and which figure stands where, and what is said about it."""
+
+from collections.abc import Mapping, Sequence
+
+from guided_lgp.params import Params
+from guided_lgp.report import findings
+from guided_lgp.report.document import (
+    Block,
+    Bullets,
+    Document,
+    Gallery,
+    Links,
+    Picture,
+    Section,
+)
+from guided_lgp.report.inputs import Inputs
+from guided_lgp.report.table import Table
+
+COMMAND = "dvc repro"
+
+DIFFERENCES = (
+    "The robot's base and torso are fixed, so that reach decides about feasibility; tables, tray "
+    "and boxes have sizes of their own, which the paper does not tell.",
+    "The two bounds of the NLP are our own: compiled stage kernels for the coarse bound, and "
+    "inverse kinematics, sampling, optimisation and time parameterisation for the path bound. "
+    "Every keyframe and every path that counts as feasible was checked in PyBullet.",
+    "The state s_k is taken after the acting arm has retreated.",
+    "Problems that are satisfied at the start are counted apart; the paper does not say whether "
+    "they are in its averages.",
+    "Tree size counts every node generated, the root included, over all attempts.",
+    "Each problem of Table III is solved in several configurations; the paper uses one.",
+    "The paper's times were measured on its own machine, so only their growth compares.",
+)
+"""Where this work departs from the paper, or had to choose."""
+
+
+def compose(
+    inputs: Inputs,
+    params: Params,
+    tables: Mapping[str, Table],
+    setups: Sequence[str],
+    replays: Sequence[tuple[str, str]],
+) -> Document:
+    """Arrange the report.
+
+    Args:
+        inputs: for the sentences.
+        params: for the seeds.
+        tables: by name.
+        setups: letters of the setups that have a picture ``setup_<letter>.png``.
+        replays: (address, text) of every replay.
+    """
+    generalization = [
+        Bullets(findings.generalization(inputs.generalization)),
+        tables["table_1"],
+        Picture(
+            "success.svg",
+            "Outcomes by type of objective over the test configurations; n: problems not "
+            "satisfied at the start, per planner.",
+        ),
+    ]
+    scalability = [
+        Bullets(findings.scalability(inputs.scalability, inputs.timing)),
+        tables["table_3_tree_size"],
+        tables["table_3_time"],
+        Picture(
+            "scalability.svg",
+            "Tree size and time to the first plan against the smallest number of actions, means "
+            "and standard deviations over the problems of Table III (n there). Open markers: the "
+            "paper's means. Crosses: stopped at the limit of the tree size.",
+        ),
+        tables["table_3_details"],
+    ]
+    policy = [
+        tables["training"],
+        Picture(
+            "learning_curves.svg",
+            "Loss and accuracy by epoch; the validation samples are those of the weights kept.",
+        ),
+        Picture(
+            "confusion.svg",
+            "Confusion of each sub-policy on its validation samples (%), rows normalised. Where "
+            "several actions are right, an entry off the diagonal need not be a mistake.",
+        ),
+    ]
+    geometry: list[Block] = [
+        Gallery([Picture(f"setup_{s}.png", f"Setup {s}") for s in setups]),
+        tables["enumeration"],
+        Picture(
+            "feasible_share.svg",
+            "Share of sequences that stay feasible with one more action, by the arm of that "
+            "action and where it takes the box from or puts it.",
+        ),
+        Picture(
+            "failures.svg",
+            "Why sequences fail the coarse bound: the constraint that stays violated, by the "
+            "action at which it does. Training and test configurations.",
+        ),
+    ]
+    if "geometry" in tables:
+        geometry.append(tables["geometry"])
+    sections = [
+        Section("Generalization", generalization),
+        Section("Scalability", scalability),
+        Section("Policy", policy),
+        Section("Geometry", geometry),
+        Section("Differences from the paper", [Bullets(DIFFERENCES)]),
+        Section("Reproduction", [*_reproduction(params)]),
+    ]
+    if replays:
+        text = "Plans as 3D replays in the browser (one file each, a minute at most to load)."
+        sections.insert(4, Section("Replays", [text, Links(replays)]))
+    return Document(
+        "Guided sequential manipulation planning: results",
+        "Tables I and III of “Guided Sequential Manipulation Planning Using a Hierarchical "
+        "Policy”, computed anew and set beside the paper's figures; planners the paper does not "
+        "have; and the training and geometry behind them.",
+        sections,
+    )
+
+
+def _reproduction(params: Params) -> Sequence[Block]:
+    scenes, limits = params.generate_scenes, params.compare_scalability
+    return (
+        f"All figures come from one run of “{COMMAND}” with the parameters of params.yaml. The "
+        "same seeds give the same figures on the same machine, times aside.",
+        Bullets(
+            (
+                f"Seeds: training scenes {scenes.seed_training}, test scenes {scenes.seed_test}, "
+                f"scalability scenes {scenes.seed_scalability}, draw of the training objectives "
+                f"{params.build_dataset.seed}, training {params.train_policy.seed}.",
+                f"Configurations: {scenes.training_configurations} for training, "
+                f"{scenes.test_configurations} for test, {scenes.scalability_configurations} of "
+                "each setup for scalability.",
+                f"Training objectives: {params.build_dataset.training_objectives} of the 72 with "
+                "two goals.",
+                f"Limits: depth {params.evaluate_generalization.max_depth} in the test of "
+                f"generalization and {limits.max_depth} in that of scalability, "
+                f"{limits.reattempts} reattempts, {limits.max_tree_size:,} nodes.",
+            )
+        ),
+    )

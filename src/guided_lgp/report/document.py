@@ -1,0 +1,104 @@
+"""The report as headings, paragraphs, tables and pictures, written as Markdown and as HTML."""
+
+from base64 import b64encode
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from guided_lgp.report.table import Table, plain
+
+
+@dataclass(frozen=True)
+class Bullets:
+    """A list of sentences."""
+
+    items: Sequence[str]
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture in ``figures/``."""
+
+    file: str
+    """Its name there, an SVG or PNG file."""
+    caption: str
+
+
+@dataclass(frozen=True)
+class Gallery:
+    """Pictures beside each other."""
+
+    pictures: Sequence[Picture]
+
+
+@dataclass(frozen=True)
+class Links:
+    """Links to other files of the report: (address relative to it, text)."""
+
+    items: Sequence[tuple[str, str]]
+
+
+Block = str | Bullets | Table | Picture | Gallery | Links
+
+
+@dataclass(frozen=True)
+class Section:
+    """A heading and what stands below it."""
+
+    title: str
+    blocks: Sequence[Block]
+
+    @property
+    def anchor(self) -> str:
+        """Identifier of the section in the page."""
+        return "-".join(self.title.lower().split())
+
+
+@dataclass(frozen=True)
+class Document:
+    """The report."""
+
+    title: str
+    lead: str
+    sections: Sequence[Section]
+
+    def markdown(self) -> str:
+        """The report for a forge or an editor; pictures stay in their files."""
+        return self._render("report.md.j2", Path())
+
+    def html(self, folder: Path) -> str:
+        """One page that needs no other file and no network, links to replays aside.
+
+        Args:
+            folder: where ``figures/`` is; the pictures become part of the page.
+        """
+        return self._render("report.html.j2", folder)
+
+    def _render(self, template: str, folder: Path) -> str:
+        environment = Environment(
+            loader=PackageLoader("guided_lgp.report"),
+            autoescape=template.endswith(".html.j2"),
+            undefined=StrictUndefined,
+            trim_blocks=True,
+            lstrip_blocks=True,
+            keep_trailing_newline=True,
+        )
+        kinds = {"paragraph": str, "bullets": Bullets, "table": Table, "picture": Picture}
+        for name, kind in (kinds | {"gallery": Gallery, "links": Links}).items():
+            environment.tests[name] = partial(_is, kind)
+        environment.globals["embed"] = lambda file: _embed(folder / "figures" / file)
+        environment.filters["plain"] = plain
+        return environment.get_template(template).render(document=self)
+
+
+def _is(kind: type, block: object) -> bool:
+    return isinstance(block, kind)
+
+
+def _embed(path: Path) -> Markup:
+    kind = "image/svg+xml" if path.suffix == ".svg" else "image/png"
+    return Markup(f"data:{kind};base64,{b64encode(path.read_bytes()).decode()}")

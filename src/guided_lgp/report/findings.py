@@ -1,0 +1,106 @@
+"""What the tables say, in words."""
+
+from collections.abc import Iterator
+
+from guided_lgp.report import paper
+from guided_lgp.report.style import PLANNERS, VARIANTS
+from guided_lgp.report.inputs import Metrics
+from guided_lgp.report.tables import number, percent
+
+GUIDED = ("guided", "guided_best_first", "relational")
+RIVALS = ("breadth_first", "breadth_first_graph", "astar")
+
+
+def generalization(metrics: Metrics) -> list[str]:
+    """One sentence per planner: shares of shortest solutions and of problems left unsolved."""
+    sentences = []
+    for variant, label in VARIANTS.items():
+        if variant not in metrics:
+            continue
+        ours, unseen = metrics[variant]["all"], metrics[variant]["unseen"]
+        printed = paper.GENERALIZATION.get(variant)
+        reference = (
+            f" (paper: {percent(printed['all']['shortest'])} and "
+            f"{percent(printed['unseen']['shortest'])})"
+            if printed
+            else ""
+        )
+        sentences.append(
+            f"{label}: the shortest solution in {percent(ours['shortest'])} of all "
+            f"{ours['n']} problems and in {percent(unseen['shortest'])} of the {unseen['n']} with "
+            f"unseen objectives{reference}; no solution in {percent(ours['no_solution'])} and "
+            f"{percent(unseen['no_solution'])}."
+        )
+    return sentences
+
+
+def scalability(metrics: Metrics, timing: Metrics) -> list[str]:
+    """How guided search compares with breadth-first, and where a rival beats it."""
+    sentences = list(_against_breadth_first(metrics))
+    sentences += [_unsolved(metrics)]
+    for quantity, key, source in (
+        ("generates fewer nodes", "tree_size_mean", metrics),
+        ("needs less time", "time_mean_s", timing),
+    ):
+        beaten = list(_beaten(metrics, source, key, quantity))
+        sentences += beaten or [
+            f"No rival (breadth-first, graph breadth-first, A*) {quantity} than guided search on "
+            "any problem that it solves completely."
+        ]
+    return sentences
+
+
+def _against_breadth_first(metrics: Metrics) -> Iterator[str]:
+    ratios, limited = [], []
+    for problem in paper.PROBLEMS:
+        cells = metrics.get(problem.name, {})
+        if not {"breadth_first", "guided"} <= cells.keys():
+            continue
+        tree, guided = cells["breadth_first"], cells["guided"]["tree_size_mean"]
+        if tree["tree_size_mean"] is None:
+            limited.append(
+                f"{problem.name} ({tree['problems_solved']} of {tree['problems']} solved)"
+            )
+        elif guided:
+            ratios.append(f"{number(tree['tree_size_mean'] / guided, 0)}× on {problem.name}")
+    if ratios:
+        yield f"The breadth-first tree is larger than the guided one by {_join(ratios)}."
+    if limited:
+        yield f"Breadth-first met the limit of the tree size on {_join(limited)}."
+
+
+def _unsolved(metrics: Metrics) -> str:
+    missing = [
+        f"{PLANNERS[planner]} {cell['problems'] - cell['problems_solved']} of "
+        f"{cell['problems']} on {name}"
+        for name, cells in metrics.items()
+        for planner, cell in cells.items()
+        if planner in GUIDED and cell["problems_solved"] < cell["problems"]
+    ]
+    if missing:
+        return f"Left without a plan: {_join(missing)}."
+    guided = [PLANNERS[p] for p in GUIDED if any(p in cells for cells in metrics.values())]
+    return f"All problems are solved with a verified path by: {_join(guided)}."
+
+
+def _beaten(metrics: Metrics, source: Metrics, key: str, quantity: str) -> Iterator[str]:
+    """Where a rival that solves every problem has a lower mean than guided search."""
+    for rival in RIVALS:
+        wins = []
+        for problem in paper.PROBLEMS:
+            cells = metrics.get(problem.name, {})
+            if not {rival, "guided"} <= cells.keys():
+                continue
+            if cells[rival]["problems_solved"] < cells[rival]["problems"]:
+                continue
+            theirs = source[problem.name][rival][key]
+            guided = source[problem.name]["guided"][key]
+            if guided is None or theirs < guided:
+                ours = number(guided) if guided is not None else "no plan"
+                wins.append(f"{problem.name} ({number(theirs)} against {ours})")
+        if wins:
+            yield f"{PLANNERS[rival]} {quantity} than guided search on {_join(wins)}."
+
+
+def _join(parts: list[str]) -> str:
+    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
