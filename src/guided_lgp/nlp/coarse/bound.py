@@ -1,0 +1,206 @@
+"""The coarse bound P_coarse of a skeleton (paper, eq. 3): starts, solver, verification."""
+
+import time
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from guided_lgp.logic import Skeleton, format_skeleton
+from guided_lgp.nlp.coarse.formulation import (
+    GRASPABLE,
+    SIDES,
+    Formulation,
+    Formulator,
+    Margins,
+    Mode,
+    SceneGeometry,
+    Snapshot,
+    UngraspableError,
+    sphere_link,
+)
+from guided_lgp.nlp.coarse.kernels import PALM_GAP, SCALE, kernels
+from guided_lgp.nlp.coarse.solver import Settings, Solution, Solver, default_solver
+from guided_lgp.nlp.coarse.starts import Starts
+from guided_lgp.nlp.results import Array, CoarseResult, Failure, Keyframe
+from guided_lgp.nlp.verify import verify_keyframes
+from guided_lgp.scene import GRIPPERS, Scene, pr2
+from guided_lgp.scene.poses import compose, multiply, pose
+from guided_lgp.scene.world import World
+
+
+@dataclass(frozen=True)
+class CoarseSolution(CoarseResult):
+    """A coarse result that remembers where its solver stopped, to start longer skeletons."""
+
+    values: Array | None = field(default=None, compare=False, repr=False)
+
+
+class CoarseBound:
+    """P_coarse for the skeletons of one scene; every feasible verdict has been verified.
+
+    A verdict depends only on the scene, the skeleton and ``tries``: it is defined by recursion
+    over the prefixes, whose constraints are a subset. A skeleton with an infeasible prefix is
+    infeasible; otherwise the first start continues the solution of the prefix.
+    """
+
+    def __init__(self, scene: Scene, tries: int, solver: Solver | None = None) -> None:
+        """Prepare a scene; ``tries`` is the number of starts before giving up."""
+        self.scene = scene
+        self._tries = tries
+        self._solver = solver or default_solver()
+        self._geometry = SceneGeometry(scene)
+        self._starts = Starts(self._geometry, self._solver)
+        self._settings = Settings()
+        self._world = World(scene)
+        self._tools = {
+            gripper: pr2.tool_pose(scene, pr2.HOME_CONFIGURATION, gripper) for gripper in GRIPPERS
+        }
+
+    def solve(self, skeleton: Skeleton, prefix: CoarseResult | None = None) -> CoarseResult:
+        """The verdict on a skeleton.
+
+        Args:
+            skeleton: at least one action; each applicable after those before it.
+            prefix: the result of this bound for ``skeleton[:-1]``; solved first if not given.
+        """
+        started = time.perf_counter()
+        if len(skeleton) > 1 and (
+            prefix is None or (prefix.feasible and not isinstance(prefix, CoarseSolution))
+        ):
+            prefix = self.solve(skeleton[:-1])
+        if prefix is not None and not prefix.feasible:
+            return CoarseResult(skeleton, feasible=False, failure=prefix.failure, tries=0)
+        known = prefix.values if isinstance(prefix, CoarseSolution) else None
+        result = self._search(skeleton, known)
+        elapsed = time.perf_counter() - started
+        return CoarseSolution(**(vars(result) | {"time_s": elapsed}))
+
+    def solutions(self, skeleton: Skeleton, count: int) -> Iterator[CoarseResult]:
+        """Up to ``count`` further verified solutions from independent starts."""
+        try:
+            formulation = Formulator(self._geometry, Margins()).build(skeleton)
+        except UngraspableError:
+            return
+        found = 0
+        for attempt in range(1, 3 * count + 1):
+            generator = _generator(skeleton, attempt)
+            start = self._starts.draw(formulation, generator, _NOISE)
+            solution = self._solver.solve(formulation.program, start, self._settings)
+            result = self._check(skeleton, formulation, solution, attempt)
+            if result.feasible:
+                found += 1
+                yield result
+            if found == count:
+                return
+
+    def _search(self, skeleton: Skeleton, known: Array | None) -> CoarseSolution:
+        try:
+            formulation = Formulator(self._geometry, Margins()).build(skeleton)
+        except UngraspableError as error:
+            excess = error.width - GRASPABLE
+            failure = Failure(error.action, f"width of {error.box}", excess, "both sides")
+            return CoarseSolution(skeleton, feasible=False, failure=failure, tries=0)
+        closest: tuple[float, Failure | None] = (np.inf, None)
+        for attempt in range(self._tries):
+            generator = _generator(skeleton, attempt)
+            start = self._starts.draw(
+                formulation,
+                generator,
+                noise=0.0 if attempt == 0 else _NOISE,
+                known=known if attempt in (0, 2) else None,
+            )
+            solution = self._solver.solve(formulation.program, start, self._settings)
+            result = self._check(skeleton, formulation, solution, attempt + 1)
+            if result.feasible:
+                return result
+            if solution.violation < closest[0]:
+                closest = (solution.violation, result.failure)
+        assert closest[1] is not None
+        failure = Failure(
+            closest[1].action,
+            closest[1].constraint,
+            closest[1].violation,
+            f"{self._tries} starts of the coarse bound",
+        )
+        return CoarseSolution(skeleton, feasible=False, failure=failure, tries=self._tries)
+
+    def _check(
+        self, skeleton: Skeleton, formulation: Formulation, solution: Solution, tries: int
+    ) -> CoarseSolution:
+        """Decode and verify a solution."""
+        if not solution.converged(self._settings):
+            failure = _worst(formulation, solution)
+            return CoarseSolution(skeleton, feasible=False, failure=failure, tries=tries)
+        contacts = tuple(
+            self._keyframe(formulation, s, solution.values) for s in formulation.contacts
+        )
+        retreated = tuple(
+            self._keyframe(formulation, s, solution.values) for s in formulation.retreated
+        )
+        found = verify_keyframes(self._world, skeleton, contacts, retreated)
+        if found is not None:
+            failure = Failure(found.action, found.constraint, found.amount, "verification")
+            return CoarseSolution(skeleton, feasible=False, failure=failure, tries=tries)
+        return CoarseSolution(
+            skeleton,
+            feasible=True,
+            contacts=contacts,
+            retreated=retreated,
+            tries=tries,
+            values=solution.values[: formulation.program.variables],
+        )
+
+    def _keyframe(self, formulation: Formulation, snapshot: Snapshot, values: Array) -> Keyframe:
+        """Arms and boxes in the world at a snapshot of the program."""
+        q = pr2.HOME_CONFIGURATION.copy()
+        for gripper, joints in snapshot.joints.items():
+            if joints is not None:
+                arm = values[list(joints)]
+                q[pr2.arm_slice(gripper)] = arm if SIDES[gripper] > 0 else pr2.MIRROR * arm
+        boxes = {}
+        for name, where in snapshot.boxes.items():
+            if isinstance(where, Mode):
+                boxes[name] = compose(self._tools[where.gripper], _in_tool(where, values))
+            else:
+                x, y, yaw, z = formulation.level(values, where)
+                boxes[name] = compose(self._geometry.base, pose((x, y, z), yaw))
+        return Keyframe(q, boxes)
+
+
+_NOISE = 0.3
+"""Spread of the choices in all starts but the first."""
+
+
+def _generator(skeleton: Skeleton, attempt: int) -> np.random.Generator:
+    """Random numbers of one start: of the skeleton and the number of the start only."""
+    return np.random.default_rng([zlib.crc32(format_skeleton(skeleton).encode()), attempt])
+
+
+def _in_tool(mode: Mode, values: Array) -> Array:
+    """Pose (7,) of a held box in the tool frame of its gripper."""
+    pitch, offset = values[mode.pitch], values[mode.offset]
+    reach = mode.half_length * abs(np.cos(pitch)) + mode.half_height * np.sin(pitch)
+    level = np.array([0.0, -np.sin(pitch / 2), 0.0, np.cos(pitch / 2)])
+    turned = multiply(level, pose((0, 0, 0), -mode.turn)[3:])
+    return np.array([reach + pr2.PALM_FRONT + PALM_GAP, 0.0, offset, *turned])
+
+
+def _worst(formulation: Formulation, solution: Solution) -> Failure:
+    """The constraint that is violated most."""
+    starts = formulation.program.row_start
+    worst = (-1.0, 0, 0)
+    for index, row in enumerate(formulation.rows):
+        values = solution.residuals[starts[index] : starts[index + 1]]
+        amounts = np.abs(values) if kernels()[row.kernel].equality else -values
+        position = int(np.argmax(amounts))
+        worst = max(worst, (float(amounts[position]), -index, position))
+    amount, index, position = worst[0], -worst[1], worst[2]
+    row = formulation.rows[index]
+    kernel = kernels()[row.kernel].name
+    names = list(row.names)
+    if kernel in ("clear", "apart"):
+        side = pr2.SIDE[names[1]]
+        names[1] = f"{side}_{sphere_link(position, kernel)}"
+    return Failure(row.action, " ".join(names), amount / SCALE, "solver")

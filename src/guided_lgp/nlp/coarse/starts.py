@@ -1,0 +1,249 @@
+"""Starts of the solver: placements drawn on their supports, grasps by closed-form kinematics.
+
+A start chooses, action by action, where boxes are put down and, for each mode of a box in a
+gripper, one pitch for which all its configurations have an inverse kinematic solution within the
+joint limits. That is most of the work: the solver only has to make it collision-free and exact.
+"""
+
+import numpy as np
+
+from guided_lgp.nlp.coarse.formulation import (
+    SIDES,
+    Formulation,
+    Level,
+    Mode,
+    Placement,
+    Posture,
+    SceneGeometry,
+    Separation,
+)
+from guided_lgp.nlp.coarse.solver import Solver
+from guided_lgp.nlp.results import Array
+from guided_lgp.scene import pr2
+
+_PANS = np.linspace(-0.65, 1.6, 10)
+_PITCHES = np.pi * np.array([0.2, 0.35, 0.5, 0.65, 0.8])
+_PLACEMENTS = 6
+_LIMITS = pr2.JOINT_LIMITS[:7]
+_HOME = pr2.HOME["pr2L"]
+
+
+class Starts:
+    """Draws starts for one formulation."""
+
+    def __init__(self, geometry: SceneGeometry, solver: Solver) -> None:
+        self._geometry = geometry
+        self._solver = solver
+        self._torso = geometry.scene.robot.torso
+
+    def draw(
+        self,
+        formulation: Formulation,
+        generator: np.random.Generator,
+        noise: float,
+        known: Array | None = None,
+    ) -> Array:
+        """A start.
+
+        Args:
+            formulation: the program.
+            generator: for placements and choices.
+            noise: how far from the best candidates the choice may be (0: the best ones).
+            known: values of the first variables, which are kept.
+
+        Returns:
+            values of the variables, then the constants.
+        """
+        values = np.concatenate([formulation.defaults, formulation.constants])
+        fixed = 0 if known is None else len(known)
+        if known is not None:
+            values[:fixed] = known
+        draft = _Draft(self, formulation, generator, noise, values, fixed)
+        for step in formulation.steps:
+            for item in step:
+                draft.add(item)
+        draft.finish()
+        return values
+
+
+class _Draft:
+    """One start in the making."""
+
+    def __init__(
+        self,
+        starts: Starts,
+        formulation: Formulation,
+        generator: np.random.Generator,
+        noise: float,
+        values: Array,
+        fixed: int,
+    ) -> None:
+        self._solver = starts._solver
+        self._torso = starts._torso
+        self._generator = generator
+        self._noise = noise
+        self._values = values
+        self._fixed = fixed
+        self._modes = {id(posture): mode for mode in formulation.modes for posture in mode.postures}
+        self._mode_of = {
+            (mode.box, posture.action): mode
+            for mode in formulation.modes
+            for posture in mode.postures
+        }
+        self._formulation = formulation
+
+    def add(self, item: Mode | Placement | Separation | Posture) -> None:
+        if isinstance(item, Placement):
+            self._place(item)
+        elif isinstance(item, Separation):
+            if item.angle >= self._fixed:
+                self._values[item.angle] = self._separating(item)
+        elif isinstance(item, Posture) and item.free:
+            self._offer(item)
+
+    def finish(self) -> None:
+        for mode in self._formulation.modes:
+            self._hold(mode)
+
+    def pose(self, level: Level) -> Array:
+        """x, y, yaw and z of a level body."""
+        return np.array(self._formulation.level(self._values, level))
+
+    def _place(self, item: Placement) -> None:
+        if item.level.x < self._fixed:
+            return
+        support = self.pose(item.support)
+        count = _PLACEMENTS
+        local = self._generator.uniform(-1, 1, (count, 2)) * np.array(item.half)
+        cosine, sine = np.cos(support[2]), np.sin(support[2])
+        candidates = np.empty((count, 4))
+        candidates[:, 0] = support[0] + cosine * local[:, 0] - sine * local[:, 1]
+        candidates[:, 1] = support[1] + sine * local[:, 0] + cosine * local[:, 1]
+        candidates[:, 2] = self._generator.uniform(-np.pi / 2, np.pi / 2, count)
+        candidates[:, 3] = support[3] + item.level.offset - item.support.offset
+        overlap = self._overlaps(item, candidates)
+        mode = self._mode_of[item.box, item.action]
+        origin = self.pose(mode.postures[0].level)
+        pitches = self._pitches(mode)
+        grasp = self._costs(mode, origin[None], pitches)
+        place = self._costs(mode, candidates, pitches)
+        total = (grasp + place).min(axis=1) + overlap
+        best = self._choose(total)
+        for slot, value in zip(item.level.plane, candidates[best], strict=False):
+            self._values[slot] = value
+        for before, after in item.carried:
+            self._carry(self.pose(item.old), self.pose(before), self.pose(item.level), after)
+
+    def _carry(self, old: Array, before: Array, new: Array, after: Level) -> None:
+        turn = new[2] - old[2]
+        cosine, sine = np.cos(turn), np.sin(turn)
+        dx, dy = before[0] - old[0], before[1] - old[1]
+        self._values[after.x] = new[0] + cosine * dx - sine * dy
+        self._values[after.y] = new[1] + sine * dx + cosine * dy
+        self._values[after.yaw] = before[2] + turn
+
+    def _overlaps(self, item: Placement, candidates: Array) -> Array:
+        """How much (m) each candidate overlaps what is beside it."""
+        total = np.zeros(len(candidates))
+        for other in self._formulation.steps[item.action]:
+            if isinstance(other, Separation) and other.first is item.level:
+                total += np.array(
+                    [
+                        max(0.0, -_separation(c, self.pose(other.second), other.halves)[0])
+                        for c in candidates
+                    ]
+                )
+        return 20 * total
+
+    def _separating(self, item: Separation) -> float:
+        return _separation(self.pose(item.first), self.pose(item.second), item.halves)[1]
+
+    def _offer(self, item: Posture) -> None:
+        if item.level.x < self._fixed:
+            return
+        count = _PLACEMENTS
+        mode = self._modes[id(item)]
+        candidates = np.empty((count, 4))
+        candidates[:, 0] = self._generator.uniform(0.4, 0.65, count)
+        candidates[:, 1] = self._generator.uniform(-0.15, 0.25, count) * SIDES[mode.gripper]
+        candidates[:, 2] = self._generator.uniform(-np.pi / 2, np.pi / 2, count)
+        lowest = self._formulation.program.lower[item.level.z]
+        candidates[:, 3] = lowest + self._generator.uniform(0.0, 0.1, count)
+        pitches = self._pitches(mode)
+        grasp = self._costs(mode, self.pose(mode.postures[0].level)[None], pitches)
+        total = (grasp + self._costs(mode, candidates, pitches)).min(axis=1)
+        best = self._choose(total)
+        for slot, value in zip((*item.level.plane, item.level.z), candidates[best], strict=True):
+            self._values[slot] = value
+
+    def _pitches(self, mode: Mode) -> Array:
+        if mode.pitch < self._fixed:
+            return self._values[[mode.pitch]]
+        return _PITCHES
+
+    def _hold(self, mode: Mode) -> None:
+        """Choose one pitch for a mode and the joints of its postures."""
+        open_postures = [p for p in mode.postures if p.joints[0] >= self._fixed]
+        if not open_postures:
+            return
+        poses = np.array([self.pose(posture.level) for posture in mode.postures])
+        if mode.pitch < self._fixed:
+            pitches = self._values[[mode.pitch]]
+        else:
+            pitches = np.clip(
+                _PITCHES + self._noise * self._generator.uniform(-0.4, 0.4), 0.05, np.pi - 0.05
+            )
+        costs = self._costs(mode, poses, pitches)
+        best = self._choose(costs.sum(axis=0))
+        if mode.pitch >= self._fixed:
+            self._values[mode.pitch] = pitches[best]
+        for posture, pose in zip(mode.postures, poses, strict=True):
+            if posture.joints[0] >= self._fixed:
+                joints, costs = self._solutions(mode, pose[None], pitches[[best]])
+                chosen = self._choose(costs[0, 0])
+                self._values[list(posture.joints)] = joints[0, 0, chosen]
+
+    def _choose(self, costs: Array) -> int:
+        if self._noise:
+            costs = costs + self._noise * self._generator.exponential(1.0, costs.shape)
+        return int(np.argmin(costs))
+
+    def _costs(self, mode: Mode, poses: Array, pitches: Array) -> Array:
+        """Least cost (len(poses), len(pitches)) over the shoulder's pan."""
+        return np.asarray(self._solutions(mode, poses, pitches)[1].min(axis=2))
+
+    def _solutions(self, mode: Mode, poses: Array, pitches: Array) -> tuple[Array, Array]:
+        """Inverse kinematics: joints (poses, pitches, pans, 7) and costs (poses, pitches, pans)."""
+        shape = (len(poses), len(pitches), 2 * len(_PANS))
+        arguments = np.empty((*shape, 15))
+        arguments[..., :4] = poses[:, None, None]
+        arguments[..., 4] = pitches[:, None]
+        arguments[..., 5] = self._values[mode.offset]
+        arguments[..., 6] = np.tile(_PANS, 2)
+        arguments[..., 7] = np.repeat([1.0, -1.0], len(_PANS))
+        arguments[..., 8] = SIDES[mode.gripper]
+        arguments[..., 9] = self._torso
+        arguments[..., 10] = 0.0
+        arguments[..., 11:15] = mode.half_length, mode.half_height, mode.turn, 0.0
+        solutions = self._solver.reach(arguments.reshape(-1, 15)).reshape(*shape, 8)
+        joints = solutions[..., :7]
+        beyond = np.maximum(_LIMITS[:, 0] - joints, 0) + np.maximum(joints - _LIMITS[:, 1], 0)
+        motion = ((joints - _HOME) ** 2)[..., :4].sum(axis=-1)
+        costs = 5 * beyond.sum(axis=-1) + 20 * solutions[..., 7] + 0.05 * motion
+        return np.clip(joints, _LIMITS[:, 0], _LIMITS[:, 1]), costs
+
+
+def _separation(
+    first: Array, second: Array, halves: tuple[float, float, float, float]
+) -> tuple[float, float]:
+    """Largest distance (m) along the boxes' axes that separates them, and that direction (rad)."""
+    angles = np.concatenate([first[2] + _QUARTERS, second[2] + _QUARTERS])
+    normals = np.stack([np.cos(angles), np.sin(angles)])
+    distance = (second[:2] - first[:2]) @ normals
+    for yaw, (hx, hy) in ((first[2], halves[:2]), (second[2], halves[2:])):
+        distance = distance - hx * np.abs(np.cos(angles - yaw)) - hy * np.abs(np.sin(angles - yaw))
+    best = int(np.argmax(distance))
+    return float(distance[best]), float(angles[best])
+
+
+_QUARTERS = np.arange(4) * np.pi / 2
