@@ -5,10 +5,10 @@ from pathlib import Path
 from guided_lgp.params import Params
 from guided_lgp.paths import DATASET, TRAINED, TRAINING
 from guided_lgp.policy.dataset import load_dataset
-from guided_lgp.policy.train import LoggerFactory, train_network
+from guided_lgp.policy.train import train_network
 
 
-def run(params: Params, root: Path, network: str, logger_factory: LoggerFactory) -> None:
+def run(params: Params, root: Path, network: str) -> None:
     """Write ``models/<network>.safetensors`` and ``.json`` and the report of the training."""
     report = train_network(
         network,
@@ -16,6 +16,5 @@ def run(params: Params, root: Path, network: str, logger_factory: LoggerFactory)
         params.train_policy,
         params.parallel,
         root / TRAINED,
-        logger_factory,
     )
     report.save(root / TRAINING / f"{network}.json")

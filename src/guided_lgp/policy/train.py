@@ -2,10 +2,10 @@
 
 import json
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,12 +17,6 @@ from guided_lgp.policy.dataset import Dataset
 from guided_lgp.policy.encoding import CHAINS
 from guided_lgp.policy.models import Model
 from guided_lgp.policy.training import Fit, fit
-
-if TYPE_CHECKING:
-    from lightning.pytorch.loggers import Logger
-
-LoggerFactory = Callable[[str], "Logger | None"]
-"""Makes the logger of one learning curve, given its name such as ``place.box.random``."""
 
 SPLITS = ("random", "configuration")
 """How validation samples are chosen. The paper's random choice decides about the weights that are
@@ -73,7 +67,6 @@ class _Task:
     settings: Network
     patience: int
     seed: np.random.SeedSequence
-    logger_factory: LoggerFactory
 
     @property
     def name(self) -> str:
@@ -86,7 +79,6 @@ def train_network(
     settings: TrainPolicy,
     parallel: Parallel,
     directory: Path,
-    logger_factory: LoggerFactory,
 ) -> TrainingReport:
     """Train the sub-policies of a network and save it.
 
@@ -96,7 +88,6 @@ def train_network(
         settings: of training (paper, Table IV).
         parallel: back end and workers; the result does not depend on them.
         directory: for ``<network>.safetensors`` and ``<network>.json``.
-        logger_factory: picklable, called in the worker.
 
     Raises:
         InputError: too few samples to split, or a training that diverges at once.
@@ -113,7 +104,6 @@ def train_network(
             settings=own,
             patience=settings.patience,
             seed=np.random.SeedSequence([settings.seed, list(CHAINS).index(network), index]),
-            logger_factory=logger_factory,
         )
         for split in SPLITS
         for index, sub_policy in enumerate(CHAINS[network])
@@ -160,7 +150,6 @@ def _train(task: _Task) -> Fit:
         settings=task.settings,
         patience=task.patience,
         seed=task.seed,
-        logger=task.logger_factory(task.name),
     )
     best = result.best_epoch - 1
     logger.info(

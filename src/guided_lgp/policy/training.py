@@ -11,7 +11,6 @@ import lightning
 import numpy as np
 import torch
 from lightning.pytorch.callbacks import Callback, EarlyStopping
-from lightning.pytorch.loggers import Logger
 from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional
@@ -156,7 +155,6 @@ def fit(
     settings: Network,
     patience: int,
     seed: np.random.SeedSequence,
-    logger: Logger | None = None,
 ) -> Fit:
     """Train one classifier until its validation loss stops falling.
 
@@ -169,7 +167,6 @@ def fit(
         settings: architecture and optimiser (paper, Table IV).
         patience: epochs without a lower validation loss before training stops.
         seed: of the weights, dropout and the order of the samples.
-        logger: takes the learning curves, once per epoch.
 
     Raises:
         InputError: the validation loss was never finite.
@@ -184,8 +181,7 @@ def fit(
             devices=1,
             max_epochs=settings.epochs,
             callbacks=[best, EarlyStopping("validation_loss", patience=patience)],
-            logger=logger or False,
-            log_every_n_steps=1,
+            logger=False,  # the curves are part of the result, and MLflow gets them from there
             num_sanity_val_steps=0,
             enable_checkpointing=False,
             enable_progress_bar=False,
