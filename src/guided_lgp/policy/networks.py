@@ -72,9 +72,10 @@ class Classifier(nn.Module):
         parts = torch.split(masks, [count * width for width in nodes])
         return [part.view(count, width) for part, width in zip(parts, nodes, strict=True)]
 
-    @torch.no_grad()
     def descend(self, inputs: Tensor, classes: Tensor) -> Tensor:
         """Fill ``gradient`` with the gradient of the mean cross-entropy of a batch.
+
+        To be called in ``torch.inference_mode``, which saves a sixth of the time.
 
         Args:
             inputs: (n, inputs).

@@ -67,6 +67,7 @@ class SubPolicy(lightning.LightningModule):
     def configure_optimizers(self) -> None:
         """None: :meth:`training_step` updates the parameters itself."""
 
+    @torch.inference_mode()
     def training_step(self, batch: tuple[Tensor, Tensor], index: int) -> None:
         """One epoch of mini-batches; the curves are computed once from the collected logits."""
         inputs, classes = batch
