@@ -8,6 +8,8 @@ places that root in the world.
 import os
 import tempfile
 import xml.etree.ElementTree as ET
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, files
@@ -215,15 +217,36 @@ def disabled_pairs() -> frozenset[frozenset[str]]:
     )
 
 
+@dataclass(frozen=True)
+class JointIndex:
+    """Where a joint stands in pinocchio's configuration and velocity vectors."""
+
+    position: int
+    velocity: int
+    continuous: bool
+    """A continuous joint is stored as cosine and sine."""
+
+
 @cache
-def _kinematics() -> tuple[Any, Any, list[tuple[int, bool]], int]:
-    """Model, data, (index, whether continuous) of each arm joint, index of the torso."""
+def kinematics() -> tuple[Any, Any, list[JointIndex], int]:
+    """Pinocchio's model and data, where the 14 arm joints stand, and the torso's position."""
     import pinocchio  # heavy: only where kinematics are needed
 
     model = pinocchio.buildModelFromUrdf(str(urdf_path()))
     joints = [model.joints[model.getJointId(name)] for name in ARM_JOINTS]
     torso = model.joints[model.getJointId("torso_lift_joint")]
-    return model, model.createData(), [(j.idx_q, j.nq == 2) for j in joints], torso.idx_q
+    indices = [JointIndex(joint.idx_q, joint.idx_v, joint.nq == 2) for joint in joints]
+    return model, model.createData(), indices, torso.idx_q
+
+
+def fill(full: Array, indices: Sequence[JointIndex], angles: Array) -> None:
+    """Write joint angles (..., n) in rad into pinocchio configurations (..., nq)."""
+    for column, index in enumerate(indices):
+        if index.continuous:
+            full[..., index.position] = np.cos(angles[..., column])
+            full[..., index.position + 1] = np.sin(angles[..., column])
+        else:
+            full[..., index.position] = angles[..., column]
 
 
 def base_pose(scene: Scene) -> Array:
@@ -240,21 +263,38 @@ def link_pose(scene: Scene, q: Array, link: str) -> Array:
         q: configuration (14,) in rad.
         link: name in the URDF; the fingers are at zero.
     """
+    return np.asarray(link_poses(scene, np.asarray(q)[None], (link,))[0, 0])
+
+
+def link_poses(scene: Scene, q: Array, links: Sequence[str]) -> Array:
+    """Poses (T, len(links), 7) of links along a motion q (T, 14); see :func:`link_pose`."""
     import pinocchio
 
-    model, data, joints, torso = _kinematics()
-    full = pinocchio.neutral(model)
-    full[torso] = scene.robot.torso
-    for (index, continuous), angle in zip(joints, q, strict=True):
-        if continuous:
-            full[index : index + 2] = np.cos(angle), np.sin(angle)
-        else:
-            full[index] = angle
-    pinocchio.forwardKinematics(model, data, full)
-    placement = pinocchio.updateFramePlacement(model, data, model.getFrameId(link))
-    return compose(base_pose(scene), np.array(pinocchio.SE3ToXYZQUAT(placement)))
+    model, data, joints, torso = kinematics()
+    full = np.tile(pinocchio.neutral(model), (len(q), 1))
+    full[:, torso] = scene.robot.torso
+    fill(full, joints, np.asarray(q))
+    frames = [model.getFrameId(link) for link in links]
+    poses = np.empty((len(q), len(links), 7))
+    for row, configuration in enumerate(full):
+        pinocchio.forwardKinematics(model, data, configuration)
+        for column, frame in enumerate(frames):
+            placement = pinocchio.updateFramePlacement(model, data, frame)
+            poses[row, column] = pinocchio.SE3ToXYZQUAT(placement)
+    return compose(base_pose(scene), poses)
 
 
 def tool_pose(scene: Scene, q: Array, gripper: str) -> Array:
     """Pose (7,) of the gripper's tool frame in the world; see :func:`link_pose`."""
     return link_pose(scene, q, TOOL_LINK[gripper])
+
+
+def tool_poses(scene: Scene, q: Array) -> dict[str, Array]:
+    """Poses (T, 7) of both tool frames along a motion q (T, 14), by gripper."""
+    poses = link_poses(scene, q, [TOOL_LINK[gripper] for gripper in GRIPPERS])
+    return {gripper: poses[:, column] for column, gripper in enumerate(GRIPPERS)}
+
+
+LEVER: Array = np.tile([1.002, 0.902, 0.501, 0.501, 0.180, 0.180, 0.0], 2)
+"""(14,) m. Longest distance from each joint's axis to the tool frame, over all configurations:
+a joint that turns by an angle moves the tool by at most its lever times the angle."""

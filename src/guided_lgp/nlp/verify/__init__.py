@@ -8,11 +8,13 @@ A violation names its constraint: ``joint limit <joint>``, ``collision <body> <b
 another, is tilted), ``height <box>`` (it floats above or sinks into its support), ``balance <box>``
 (the centre of mass of the box and all it carries is not above its support), ``rigid <box>`` (it
 moves relative to what holds or supports it); and along a path also ``jump <joint>``,
-``velocity <joint>``, ``acceleration <joint>``, ``fingers <gripper>``, ``start``, ``attachments``
-and ``goal <box>``.
+``velocity <joint>``, ``acceleration <joint>``, ``fingers <gripper>`` (not closed on the box they
+carry), ``start`` (not with both arms at their side), ``attachments`` (not those of the skeleton),
+``samples`` (of impossible shape or order) and ``joint names`` (an arm or finger joint is missing).
 """
 
 from guided_lgp.nlp.verify.geometry import Violation
 from guided_lgp.nlp.verify.keyframes import verify_keyframe, verify_keyframes
+from guided_lgp.nlp.verify.path import PathReport, verify_path
 
-__all__ = ["Violation", "verify_keyframe", "verify_keyframes"]
+__all__ = ["PathReport", "Violation", "verify_keyframe", "verify_keyframes", "verify_path"]
