@@ -1,0 +1,149 @@
+"""Motions of one arm while everything else stands still: transits and straight lines."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from guided_lgp.nlp.path.collision import CollisionChecker, Mode
+from guided_lgp.nlp.path.connect import connect, shortcut
+from guided_lgp.nlp.path.ik import Arm
+from guided_lgp.nlp.path.spaces import JointSpace, LevelSpace, continuous_path, turned, wound
+from guided_lgp.nlp.results import Array
+from guided_lgp.scene import GRIPPERS, Scene
+from guided_lgp.scene.pr2 import arm_slice
+
+LINE_STEP = 0.01
+"""Distance (m) of configurations along a straight line."""
+_ROUNDINGS = (0.35, 0.1)
+"""Shares of a corner's edges that its rounding may take."""
+_SHORTCUTS = 12
+"""Random shortcuts tried on a path of the sampling planner."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """One arm follows a path from rest to rest."""
+
+    gripper: str
+    path: Array
+    """Configurations (n, 7) in rad, for a cubic spline through them."""
+
+
+@dataclass(frozen=True)
+class Still:
+    """What stands still while one arm moves: the mode, the other arm, the fingers."""
+
+    mode: Mode
+    q: Array
+    """Configuration (14,); the moving arm's part does not matter."""
+    fingers: Mapping[str, float]
+    """Value (rad) of the finger joints by gripper."""
+
+
+class Mover:
+    """Plans motions in one scene. Deterministic: every call brings its source of randomness."""
+
+    def __init__(self, scene: Scene, iterations: int) -> None:
+        self.arms = {gripper: Arm(scene, gripper) for gripper in GRIPPERS}
+        self._checker = CollisionChecker(scene)
+        self._iterations = iterations
+
+    def collision(self, still: Still, q: Array) -> tuple[str, str] | None:
+        """The first pair of bodies in collision along configurations (n, 7) of the moving arm."""
+        return self._space(still).collision(q)
+
+    def line(
+        self, arm: Arm, tool: tuple[Array, Array], direction: Array, pan: float, side: int
+    ) -> Array | None:
+        """Move the tool straight, without turning it, at constant pan angle.
+
+        Args:
+            arm: the arm.
+            tool: rotation (3, 3) and origin (3,) of the tool frame at the start.
+            direction: displacement (3,) of the tool (m).
+            pan: angle of the pan joint (rad).
+            side: of the elbow.
+
+        Returns:
+            Configurations (n, 7), or None where the line leaves the arm's reach.
+        """
+        count = 2 + int(np.linalg.norm(direction) / LINE_STEP)
+        position = tool[1] + np.linspace(0.0, 1.0, count)[:, None] * direction
+        q, valid = arm.inverse(tool[0], position, np.full(count, pan))
+        return continuous_path(q[:, side], valid[:, side])
+
+    def transit(
+        self, still: Still, start: Array, goal: Array, rng: np.random.Generator
+    ) -> list[Array] | None:
+        """A free motion in joint space: the direct line, or else RRT-Connect and shortcuts.
+
+        Returns:
+            Paths (n, 7) with a rest between two of them, or None.
+        """
+        space = self._space(still)
+        points = connect(space, start, goal, rng, self._iterations)
+        if points is None:
+            return None
+        if len(points) > 2:
+            points = shortcut(space, points, rng, _SHORTCUTS)
+        return _rounded(space, points)
+
+    def level_transit(
+        self, still: Still, start: Array, goal: Array, rng: np.random.Generator
+    ) -> list[Array] | None:
+        """A free motion on which the hand keeps its tilt: what it holds stays level.
+
+        Both ends must have the elbow on the same side, and the hand at the same tilt.
+        """
+        arm = self.arms[still.mode.gripper]
+        rotation, position = arm.forward(np.stack([start, goal]))
+        turn = rotation[1] @ rotation[0].T
+        yaw = float(np.arctan2(turn[1, 0], turn[0, 0]))
+        if not np.allclose(turned(rotation[0], np.array([yaw]))[0], rotation[1], atol=1e-6):
+            return None
+        solutions, _ = arm.inverse(rotation, position, np.array([start[0], goal[0]]))
+        sides = [
+            int(np.argmin(np.abs(np.sin((q - end) / 2)).sum(axis=1)))
+            for q, end in zip(solutions, (start, goal), strict=True)
+        ]
+        if sides[0] != sides[1]:
+            return None
+        space = LevelSpace(self._space(still), arm, rotation[0], sides[0])
+        ends = np.array([[*position[0], 0.0, start[0]], [*position[1], yaw, goal[0]]])
+        points = connect(space, ends[0], ends[1], rng, self._iterations)
+        if points is None:
+            return None
+        if len(points) > 2:
+            points = shortcut(space, points, rng, _SHORTCUTS)
+        paths = []
+        for first, last in zip(points[:-1], points[1:], strict=True):
+            path = space.path(first, last)
+            assert path is not None  # the planner has followed it
+            paths.append(wound(path, start if not paths else paths[-1][-1]))
+        return paths
+
+    def _space(self, still: Still) -> JointSpace:
+        self._checker.enter(still.mode)
+        return JointSpace(self._checker, self.arms[still.mode.gripper], still.q, still.fingers)
+
+
+def _rounded(space: JointSpace, points: list[Array]) -> list[Array]:
+    """The polyline as smooth paths: corners become parabolas where these are free.
+
+    A corner that cannot be rounded becomes a rest.
+    """
+    paths: list[Array] = []
+    path = [points[0]]
+    for before, corner, after in zip(points, points[1:], points[2:], strict=False):
+        for share in _ROUNDINGS:
+            begin, end = corner + share * (before - corner), corner + share * (after - corner)
+            t = np.linspace(0.0, 1.0, 9)[:, None]
+            curve = (1 - t) ** 2 * begin + 2 * t * (1 - t) * corner + t**2 * end
+            if space.collision(curve) is None:
+                path += [*space.path(path[-1], begin)[1::2], *curve]
+                break
+        else:
+            paths.append(np.array([*path, *space.path(path[-1], corner)[1:]]))
+            path = [corner]
+    return [*paths, np.array([*path, *space.path(path[-1], points[-1])[1:]])]
