@@ -42,24 +42,35 @@ def domain(symbols: Symbols) -> str:
     return text + ")\n"
 
 
-def problem(state: State, objective: Objective, symbols: Symbols) -> str:
-    """One planning problem; names in lower case, as PDDL ignores case."""
+def initial_facts(state: State, symbols: Symbols) -> list[list[str]]:
+    """What holds in a state; names in lower case, as PDDL ignores case."""
     busy = {gripper for _, gripper in state.held}
-    facts = [f"(on {box} {table})" for box, table in state.support]
-    facts += [f"(holding {gripper} {box}) (carried {box})" for box, gripper in state.held]
-    facts += [f"(free {gripper})" for gripper in symbols.grippers if gripper not in busy]
-    facts += [f"(other {g} {h})" for g in symbols.grippers for h in symbols.grippers if g != h]
-    goals = [
-        f"(carried {goal.box})" if goal.kind == "held" else f"(on {goal.box} {goal.table})"
+    facts = [f"on {box} {table}" for box, table in state.support]
+    facts += [f"holding {gripper} {box}" for box, gripper in state.held]
+    facts += [f"carried {box}" for box, _ in state.held]
+    facts += [f"free {gripper}" for gripper in symbols.grippers if gripper not in busy]
+    facts += [f"other {g} {h}" for g in symbols.grippers for h in symbols.grippers if g != h]
+    return [fact.lower().split() for fact in facts]
+
+
+def goal_facts(objective: Objective) -> list[list[str]]:
+    """What an objective asks for."""
+    return [
+        ["carried", goal.box] if goal.table is None else ["on", goal.box, goal.table]
         for goal in objective
     ]
-    text = f"""(define (problem p) (:domain pick-and-place)
- (:objects {" ".join(symbols.grippers)} - gripper {" ".join(symbols.boxes)} - box
+
+
+def problem(state: State, objective: Objective, symbols: Symbols) -> str:
+    """One planning problem."""
+    facts = " ".join(f"({' '.join(fact)})" for fact in initial_facts(state, symbols))
+    goals = " ".join(f"({' '.join(fact)})" for fact in goal_facts(objective))
+    return f"""(define (problem p) (:domain pick-and-place)
+ (:objects {" ".join(symbols.grippers).lower()} - gripper {" ".join(symbols.boxes)} - box
   {" ".join(symbols.surfaces)} - surface)
- (:init {" ".join(facts)})
- (:goal (and {" ".join(goals)})))
+ (:init {facts})
+ (:goal (and {goals})))
 """
-    return text.lower()
 
 
 def step(state: State, action: Action, symbols: Symbols) -> str:

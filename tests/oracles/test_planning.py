@@ -10,7 +10,8 @@ from pyperplan.planner import search_plan
 from pyperplan.search import breadth_first_search
 from unified_planning.engines import ValidationResultStatus
 from unified_planning.io import PDDLReader
-from unified_planning.shortcuts import PlanValidator, get_environment
+from unified_planning.model import FNode
+from unified_planning.shortcuts import PlanValidator, Problem, get_environment
 
 from guided_lgp.errors import InputError
 from guided_lgp.logic import (
@@ -52,6 +53,26 @@ def random_pair(symbols: Symbols, rng: np.random.Generator) -> tuple[State, Obje
         return state, objective
 
 
+def validated_task(
+    template: Problem, state: State, objective: Objective, symbols: Symbols
+) -> Problem:
+    """The problem as parsed by unified-planning, with another start and another goal."""
+
+    def expression(fact: list[str]) -> FNode:
+        name, *arguments = fact
+        return template.fluent(name)(*map(template.object, arguments))
+
+    task = template.clone()
+    for fluent in template.initial_values:
+        task.set_initial_value(fluent, False)
+    for fact in pddl.initial_facts(state, symbols):
+        task.set_initial_value(expression(fact), True)
+    task.clear_goals()
+    for fact in pddl.goal_facts(objective):
+        task.add_goal(expression(fact))
+    return task
+
+
 @pytest.mark.parametrize("symbols", PAIRS, ids=["three", "four"])
 def test_minimal_lengths_and_plans(symbols: Symbols, tmp_path: Path) -> None:
     logging.disable(logging.INFO)
@@ -60,6 +81,11 @@ def test_minimal_lengths_and_plans(symbols: Symbols, tmp_path: Path) -> None:
     domain, problem = tmp_path / "domain.pddl", tmp_path / "problem.pddl"
     domain.write_text(pddl.domain(symbols))
     operators = relaxed_operators(symbols)
+    reader = PDDLReader()
+    state, objective = random_pair(symbols, rng)
+    template = reader.parse_problem_string(
+        domain.read_text(), pddl.problem(state, objective, symbols)
+    )
     for _ in range(PAIRS[symbols]):
         state, objective = random_pair(symbols, rng)
         problem.write_text(pddl.problem(state, objective, symbols))
@@ -84,8 +110,7 @@ def test_minimal_lengths_and_plans(symbols: Symbols, tmp_path: Path) -> None:
             )
             steps.append(pddl.step(space.states[number], action, symbols))
             number = target
-        reader = PDDLReader()
-        task = reader.parse_problem_string(domain.read_text(), problem.read_text())
+        task = validated_task(template, state, objective, symbols)
         plan = reader.parse_plan_string(task, "\n".join(steps))
         with PlanValidator(name="sequential_plan_validator") as validator:
             assert validator.validate(task, plan).status == ValidationResultStatus.VALID
