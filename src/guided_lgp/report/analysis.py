@@ -1,12 +1,12 @@
-"""What the verdicts and the outcomes say, as small tables of numbers."""
+"""What verdicts and outcomes say, as small tables of numbers."""
 
 import re
 from collections.abc import Collection, Mapping
 
 import pandas as pd
 
-from guided_lgp.logic import Goal, State, parse_skeleton, successor
-from guided_lgp.scene import GRIPPERS, Scene
+from guided_lgp.logic import Goal, State, parse_skeleton, progress
+from guided_lgp.scene import Scene
 
 BOX, HELD_BOX = "box", "held box"
 
@@ -16,23 +16,32 @@ def objective_kind(objective: str, boxes: Collection[str]) -> str:
 
     Args:
         objective: as :func:`guided_lgp.logic.format_objective` writes it.
-        boxes: the names of the boxes; goals on any other table count as ``on table``.
+        boxes: names of the boxes; a goal on another table counts as ``on table``.
     """
     kinds = []
     for text in re.findall(r"\([^()]*\)", objective):
         goal = Goal.parse(text)
-        kinds.append("held" if goal.kind == "held" else f"on {'box' if goal.table in boxes else 'table'}")
+        support = "box" if goal.table in boxes else "table"
+        kinds.append("held" if goal.kind == "held" else f"on {support}")
     return " + ".join(sorted(kinds))
 
 
+def outcomes(problems: pd.DataFrame, scenes: Mapping[str, Scene]) -> pd.DataFrame:
+    """Planner, kind of objective and outcome of the problems not satisfied at the start."""
+    counted = problems[problems["outcome"] != "trivial"]
+    pairs = zip(counted["objective"], counted["configuration"], strict=True)
+    kinds = [objective_kind(text, scenes[name].symbols.boxes) for text, name in pairs]
+    return counted[["planner", "outcome"]].assign(kind=kinds)
+
+
 def by_length(verdicts: pd.DataFrame) -> pd.DataFrame:
-    """Sequences tried and the share that is infeasible, by split and number of actions."""
-    groups = verdicts.groupby(["split", "length"], sort=True)["feasible"]
+    """Sequences tried and the share infeasible: columns split, length, n, infeasible_share."""
+    groups = verdicts.groupby(["split", "length"])["feasible"]
     return pd.DataFrame({"n": groups.size(), "infeasible_share": 1 - groups.mean()}).reset_index()
 
 
 def by_last_action(verdicts: pd.DataFrame, scenes: Mapping[str, Scene]) -> pd.DataFrame:
-    """How often a sequence stays feasible with one more action, by arm and table.
+    """How often a sequence stays feasible with one more action, by that action.
 
     Every sequence that was tried has a feasible prefix, so its verdict is about its last action.
 
@@ -41,29 +50,28 @@ def by_last_action(verdicts: pd.DataFrame, scenes: Mapping[str, Scene]) -> pd.Da
         scenes: by name of the configuration.
 
     Returns:
-        Columns instruction, gripper, table (where the box is taken from, or put on), n, feasible.
+        Columns instruction, gripper, table (where the box is taken from or put: the name of a
+        table, ``box`` or ``held box``), n, feasible.
     """
-    states: dict[tuple[str, str], State] = {}
+    before: dict[tuple[str, str], State] = {}
     rows = []
-    for configuration, text, feasible in verdicts[["configuration", "skeleton", "feasible"]].itertuples(index=False):
-        prefix, last = _split_last(text)
+    columns = verdicts[["configuration", "skeleton", "feasible"]]
+    for configuration, skeleton, feasible in columns.itertuples(index=False):
         scene = scenes[configuration]
-        before = states.get((configuration, prefix))
-        if before is None:
-            before = scene.state
-            for action in parse_skeleton(prefix):
-                before = successor(before, action)
-            states[configuration, prefix] = before
-        (action,) = parse_skeleton(last)
-        table = action.table or before.support_of(action.box)
+        start = skeleton.rindex("(")
+        prefix = skeleton[:start]
+        state = before.get((configuration, prefix))
+        if state is None:
+            state = progress(scene.state, parse_skeleton(prefix))
+            before[configuration, prefix] = state
+        (action,) = parse_skeleton(skeleton[start:])
+        table = action.table or state.support_of(action.box)
         assert table is not None
-        if before.holder(table) is not None:
-            table = HELD_BOX
-        elif table in scene.symbols.boxes:
-            table = BOX
+        if table in scene.symbols.boxes:
+            table = BOX if state.holder(table) is None else HELD_BOX
         rows.append((action.instruction, action.gripper, table, feasible))
     frame = pd.DataFrame(rows, columns=["instruction", "gripper", "table", "feasible"])
-    groups = frame.groupby(["instruction", "gripper", "table"], sort=True)["feasible"]
+    groups = frame.groupby(["instruction", "gripper", "table"])["feasible"]
     return pd.DataFrame({"n": groups.size(), "feasible": groups.sum()}).reset_index()
 
 
@@ -74,23 +82,18 @@ def failures(verdicts: pd.DataFrame, scenes: Mapping[str, Scene]) -> pd.DataFram
         Index: constraint, the most frequent first; columns: action, from 1.
     """
     failed = verdicts[~verdicts["feasible"].astype(bool)]
-    constraints = [
-        constraint_kind(name, scenes[configuration])
-        for name, configuration in zip(failed["failure_constraint"], failed["configuration"], strict=True)
-    ]
-    counts = pd.crosstab(pd.Series(constraints, dtype=str).to_numpy(), failed["failure_action"].to_numpy() + 1)
-    return counts.loc[counts.sum(axis=1).sort_values(ascending=False, kind="stable").index]
+    pairs = zip(failed["failure_constraint"], failed["configuration"], strict=True)
+    kinds = [constraint_kind(name, scenes[configuration]) for name, configuration in pairs]
+    actions = failed["failure_action"].astype(int).to_numpy() + 1
+    counts = pd.crosstab(pd.Series(kinds, dtype=str).to_numpy(), actions)
+    order = counts.sum(axis=1).sort_values(ascending=False, kind="stable").index
+    return counts.loc[order]
 
 
 def constraint_kind(constraint: str, scene: Scene) -> str:
-    """A constraint without names: ``collision l_forearm_link tab2`` is ``collision robot, table``."""
-    kind, *bodies = constraint.split()
-    names = {table.name: "table" for table in scene.tables} | {b.name: "box" for b in scene.boxes}
-    names |= dict.fromkeys(GRIPPERS, "robot")
-    known = [names.get(body, "robot") if "_" in body or body in names else body for body in bodies]
-    return " ".join([kind, ", ".join(sorted(known))]).strip()
-
-
-def _split_last(skeleton: str) -> tuple[str, str]:
-    start = skeleton.rindex("(")
-    return skeleton[:start].rstrip(), skeleton[start:]
+    """A constraint without names: ``collision l_forearm_link tab2`` is ``collision robot–table``."""
+    kinds = {table.name: "table" for table in scene.tables} | {b.name: "box" for b in scene.boxes}
+    words = constraint.split()
+    bodies = [kinds.get(word) or ("robot" if "_link" in word else None) for word in words]
+    plain = [word for word, body in zip(words, bodies, strict=True) if body is None]
+    return " ".join([*plain, "–".join(sorted(filter(None, bodies)))]).strip()

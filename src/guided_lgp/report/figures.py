@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from guided_lgp.report import paper
-from guided_lgp.report.style import NETWORKS, PLANNER_COLORS, PLANNER_MARKERS, PLANNERS, VARIANTS
-from guided_lgp.report.tables import Metrics, stopped
+from guided_lgp.report.inputs import Metrics
+from guided_lgp.report.style import PLANNER_COLORS, PLANNER_MARKERS, PLANNERS, VARIANTS
 
 COLUMN = 3.45
 """Width of a column of a two-column page (in)."""
@@ -44,6 +44,11 @@ _STYLE = {
     "savefig.dpi": 200,
 }
 
+QUANTITIES = {
+    "tree_size": ("tree_size_mean", "tree_size_std"),
+    "time": ("time_mean_s", "time_std_s"),
+}
+
 OUTCOMES = {
     "shortest": ("Shortest", "#0072B2"),
     "feasible": ("Feasible, longer", "#9CC8E3"),
@@ -64,67 +69,80 @@ def _subplots(rows: int, columns: int, width: float, height: float, **options: A
     return figure, figure.subplots(rows, columns, squeeze=False, **options)
 
 
-def scalability(metrics: Metrics, timing: Metrics) -> Figure:
-    """Tree size and time against the smallest number of actions, ours and the paper's."""
+def scalability(metrics: Metrics, timing: Metrics, limit: int) -> Figure:
+    """Tree size and time against the smallest number of actions, ours and the paper's.
+
+    Args:
+        metrics: by problem and planner, None where a planner met the limit of the tree size.
+        timing: as ``metrics``.
+        limit: of the tree size.
+    """
     with mpl.rc_context(_STYLE):
         figure, axes = _subplots(2, 2, PAGE, 4.9, sharex=True, sharey="row")
-        rows = (
-            ("tree_size_mean", "tree_size_std", metrics, "Tree size (nodes)"),
-            ("time_mean_s", "time_std_s", timing, "Time to a plan (s)"),
-        )
-        for row, (mean, std, source, label) in zip(axes, rows, strict=True):
-            for axis, stacking in zip(row, (True, False), strict=True):
-                _against_k(axis, metrics, source, mean, std, stacking)
-                axis.set_yscale("log")
-            row[0].set_ylabel(label)
-        limits = [axis for axis in axes[0]]
-        for axis in limits:
-            axis.axhline(paper.TREE_LIMIT, color="#999999", linewidth=0.8, linestyle=":")
-        limits[0].annotate("limit of the tree size", (10, paper.TREE_LIMIT), (0, -3), textcoords="offset points", ha="right", va="top", fontsize=7, color="#777777")
-        axes[0][0].set_title("Stack boxes (a.1, b.2, c.2, d.2)")
-        axes[0][1].set_title("Place boxes on tray or table (b.1, c.1, d.1)")
-        for axis in axes[1]:
-            axis.set_xlabel("Smallest number of actions $K_{\\min}$")
-            axis.set_xticks([4, 6, 8, 10])
+        for column, stacking in enumerate((True, False)):
+            problems = [p for p in paper.PROBLEMS if p.stacking == stacking and p.name in metrics]
+            tree, time = axes[:, column]
+            names = ", ".join(problem.name for problem in problems)
+            tree.set_title(f"{'Stack boxes' if stacking else 'Place boxes side by side'} ({names})")
+            _against_k(tree, problems, metrics, "tree_size", limit)
+            _against_k(time, problems, timing, "time", None)
+            tree.axhline(limit, color="#999999", linewidth=0.8, linestyle=":")
+            time.set_xlabel(r"Smallest number of actions $K_{\mathrm{min}}$")
+            time.set_xticks(sorted({problem.k_min for problem in paper.PROBLEMS}))
+        axes[0][0].set_ylabel("Tree size (nodes)")
+        axes[1][0].set_ylabel("Time to a plan (s)")
         handles: dict[str, Any] = {}
         for axis in axes.flat:
-            for handle, name in zip(*axis.get_legend_handles_labels(), strict=True):
-                handles.setdefault(name, handle)
-        figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=4)
+            axis.set_yscale("log")
+            handles |= dict(zip(*reversed(axis.get_legend_handles_labels()), strict=True))
+        names = [f"{name}{origin}" for name in PLANNERS.values() for origin in ("", " (paper)")]
+        shown = [name for name in names if name in handles]
+        figure.legend([handles[n] for n in shown], shown, loc="outside lower center", ncols=4)
     return figure
 
 
 def _against_k(
-    axis: Axes, metrics: Metrics, source: Metrics, mean: str, std: str, stacking: bool
+    axis: Axes,
+    problems: Sequence[paper.Problem],
+    metrics: Metrics,
+    quantity: str,
+    limit: int | None,
 ) -> None:
-    problems = [p for p in paper.PROBLEMS if p.stacking == stacking and p.name in metrics]
-    for planner, name in PLANNERS.items():
-        cells = [
-            (p.k_min, source[p.name][planner])
-            for p in problems
-            if planner in metrics[p.name]
-            and not stopped(planner, metrics[p.name][planner])
-            and source[p.name][planner].get(mean) is not None
-        ]
-        color = PLANNER_COLORS[planner]
-        if cells:
-            lengths, values = zip(*((k, cell[mean]) for k, cell in cells), strict=True)
-            errors = [cell[std] or 0.0 for _, cell in cells]
-            # An error bar that reaches zero has no lower end on a log axis.
-            lower = [min(error, 0.9 * value) for error, value in zip(errors, values, strict=True)]
+    mean, std = QUANTITIES[quantity]
+    for rank, (planner, name) in enumerate(PLANNERS.items()):
+        style = {"color": PLANNER_COLORS[planner], "marker": PLANNER_MARKERS[planner]}
+        # Side by side, so that equal figures do not hide each other.
+        shift = 0.07 * (rank - (len(PLANNERS) - 1) / 2)
+        cells = [(p.k_min + shift, metrics[p.name].get(planner)) for p in problems]
+        known = [(k, cell) for k, cell in cells if cell and cell[mean] is not None]
+        if known:
+            lengths = [k for k, _ in known]
+            values = np.array([cell[mean] for _, cell in known])
+            errors = np.array([cell[std] for _, cell in known])
+            # On a log axis an error bar cannot reach zero.
+            lower = np.minimum(errors, 0.9 * values)
             axis.errorbar(
-                lengths, values, (lower, errors), color=color, marker=PLANNER_MARKERS[planner],
-                elinewidth=0.7, capsize=1.5, label=name,
+                lengths, values, (lower, errors), elinewidth=0.7, capsize=1.5, label=name, **style
+            )
+        if limit is not None:
+            stopped = [k for k, cell in cells if cell and cell[mean] is None]
+            axis.plot(
+                stopped, [limit] * len(stopped), "x", color=style["color"], markersize=6, zorder=3
             )
         printed = [
-            (p.k_min, paper.SCALABILITY[p.name][planner][mean])
+            (p.k_min + shift, paper.SCALABILITY[p.name][planner][mean])
             for p in problems
             if planner in paper.SCALABILITY[p.name]
         ]
         if printed:
             axis.plot(
-                *zip(*printed, strict=True), color=color, marker=PLANNER_MARKERS[planner],
-                markerfacecolor="white", linestyle="--", linewidth=0.8, label=f"{name} (paper)",
+                *zip(*printed, strict=True),
+                markerfacecolor="white",
+                linestyle="--",
+                linewidth=0.8,
+                label=f"{name} (paper)",
+                zorder=4,
+                **style,
             )
 
 
@@ -158,25 +176,25 @@ def success(problems: pd.DataFrame) -> Figure:
     return figure
 
 
-def learning_curves(curves: Mapping[str, pd.DataFrame]) -> Figure:
-    """Loss by epoch of every sub-policy, on training (dashed) and validation samples.
+def learning_curves(curves: Mapping[str, Mapping[str, Sequence[float]]]) -> Figure:
+    """Loss and accuracy by epoch of every sub-policy.
 
     Args:
-        curves: by "network / sub-policy"; columns epoch, train_loss, validation_loss,
-            validation_accuracy.
+        curves: by name of the sub-policy; training_loss, validation_loss, training_accuracy and
+            validation_accuracy, one value per epoch.
     """
     with mpl.rc_context(_STYLE):
         figure, axes = _subplots(2, len(curves), PAGE, 3.2, sharex=True, sharey="row")
-        for column, (title, frame) in zip(axes.T, curves.items(), strict=True):
-            loss, accuracy = column
-            loss.plot(frame["epoch"], frame["train_loss"], color="#999999", label="training")
-            loss.plot(frame["epoch"], frame["validation_loss"], color="#0072B2", label="validation")
-            accuracy.plot(frame["epoch"], 100 * frame["validation_accuracy"], color="#0072B2")
-            loss.set_title(title)
-            accuracy.set_xlabel("Epoch")
+        for column, (title, values) in zip(axes.T, curves.items(), strict=True):
+            for axis, quantity, scale in zip(column, ("loss", "accuracy"), (1, 100), strict=True):
+                for split, color in (("training", "#AAAAAA"), ("validation", "#0072B2")):
+                    heights = scale * np.array(values[f"{split}_{quantity}"])
+                    axis.plot(range(1, len(heights) + 1), heights, color=color, label=split)
+            column[0].set_title(title)
+            column[1].set_xlabel("Epoch")
         axes[0][0].set_ylabel("Loss (nats)")
         axes[1][0].set_ylabel("Accuracy (%)")
-        axes[0][-1].legend()
+        figure.legend(*axes[0][0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return figure
 
 
@@ -195,17 +213,23 @@ def confusion(matrices: Mapping[str, tuple[Sequence[str], np.ndarray]]) -> Figur
     return figure
 
 
-def feasible_share(shares: Mapping[str, tuple[Sequence[str], Sequence[str], np.ndarray, np.ndarray]]) -> Figure:
-    """Share of feasible sequences by the arm and the table of their last action.
+def feasible_share(shares: pd.DataFrame) -> Figure:
+    """Share of sequences that stay feasible with one more action, by its arm and table.
 
     Args:
-        shares: by kind of last action: arms, tables, feasible and all sequences (arms, tables).
+        shares: columns instruction, gripper, table, n, feasible.
     """
+    titles = {"grasp": "Grasp, from", "place": "Place, on"}
     with mpl.rc_context(_STYLE):
-        figure, axes = _subplots(1, len(shares), PAGE, 1.7)
-        for axis, (title, (arms, tables, feasible, total)) in zip(axes[0], shares.items(), strict=True):
-            share = np.divide(feasible, total, out=np.full(total.shape, np.nan), where=total > 0)
-            texts = [[f"{100 * s:.0f}%\nn = {int(n):,}" if n else "–" for s, n in zip(*pair, strict=True)] for pair in zip(share, total, strict=True)]
+        figure, axes = _subplots(1, len(titles), PAGE, 1.7)
+        for axis, (instruction, title) in zip(axes[0], titles.items(), strict=True):
+            rows = shares[shares["instruction"] == instruction]
+            tables = sorted(set(rows["table"]), key=lambda name: ("box" in name, name))
+            arms = sorted(set(rows["gripper"]))
+            cells = rows.set_index(["gripper", "table"])[["feasible", "n"]]
+            pairs = [[cells.T.get((arm, table)) for table in tables] for arm in arms]
+            share = np.array([[np.nan if p is None else p["feasible"] / p["n"] for p in row] for row in pairs])
+            texts = [["–" if p is None else f"{100 * p['feasible'] / p['n']:.0f}%\nn = {int(p['n']):,}" for p in row] for row in pairs]
             _heat(axis, share, arms, tables, texts)
             axis.set_title(title)
     return figure

@@ -2,21 +2,125 @@
 
 import logging
 import shutil
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import pandas as pd
+from matplotlib.figure import Figure
 
 from guided_lgp.experiments.files import write_metrics
-from guided_lgp.params import Params
+from guided_lgp.logic import parse_skeleton
+from guided_lgp.nlp.bounds import SceneBounds
+from guided_lgp.params import BoundsParams, Params
 from guided_lgp.paths import METRICS, REPORTS
 from guided_lgp.report import analysis, figures, tables
 from guided_lgp.report.contents import compose
-from guided_lgp.report.inputs import Inputs, load_inputs
+from guided_lgp.report.inputs import Inputs, Metrics, load_inputs
 from guided_lgp.report.pictures import draw_scene
+from guided_lgp.report.replay import replay_html
 from guided_lgp.report.style import NETWORKS
 from guided_lgp.report.table import Table
 from guided_lgp.scene import Scene
 
+SETUPS = "abcd"
+
 logger = logging.getLogger(__name__)
+
+
+def render(root: Path, params: Params) -> None:
+    """Write ``reports/metrics/training.json`` and the report with its tables, figures and replays.
+
+    Args:
+        root: the folder of ``dvc.yaml``.
+        params: limits and seeds, which the report names.
+
+    Raises:
+        InputError: an output of an earlier stage is missing; the message names the stage.
+    """
+    inputs = load_inputs(root)
+    reports = root / REPORTS
+    for folder in ("tables", "figures", "replays"):
+        shutil.rmtree(reports / folder, ignore_errors=True)
+        (reports / folder).mkdir(parents=True)
+    training = tables.training_metrics(inputs.training)
+    write_metrics(root / METRICS / "training.json", training)
+    written = {table.name: table for table in _tables(inputs, training)}
+    for table in written.values():
+        for suffix, text in (("md", table.markdown()), ("tex", table.latex()), ("csv", table.csv())):
+            (reports / "tables" / f"{table.name}.{suffix}").write_text(text, encoding="utf-8")
+    for name, figure in _figures(inputs, params).items():
+        figures.save(figure, reports / "figures", name)
+    scenes = {setup: inputs.scenes[f"scalability_{setup}"].scenes[0] for setup in SETUPS}
+    for setup, scene in scenes.items():
+        draw_scene(scene, reports / "figures" / f"setup_{setup}.png")
+    replays = _replays(inputs, params.bounds, reports)
+    document = compose(inputs, params, written, SETUPS, replays)
+    (reports / "report.md").write_text(document.markdown(), encoding="utf-8")
+    (reports / "report.html").write_text(document.html(reports), encoding="utf-8")
+    logger.info("report: %s", reports / "report.html")
+
+
+def _tables(inputs: Inputs, training: Metrics) -> list[Table]:
+    rejected = {name: (len(s.scenes), s.rejected) for name, s in inputs.scenes.items()}
+    optional = [tables.geometry(inputs.geometry)] if inputs.geometry is not None else []
+    return [
+        tables.generalization(inputs.generalization),
+        *tables.scalability(inputs.scalability, inputs.timing),
+        tables.training(training),
+        tables.enumeration(analysis.by_length(inputs.verdicts), rejected),
+        *optional,
+    ]
+
+
+def _figures(inputs: Inputs, params: Params) -> Mapping[str, Figure]:
+    scenes = {
+        scene.name: scene for name in ("training", "test") for scene in inputs.scenes[name].scenes
+    }
+    sub_policies = {
+        network if network == name else f"{network}: {name}": figures
+        for network in NETWORKS
+        for name, figures in inputs.training[network]["sub_policies"].items()
+    }
+    return {
+        "success": figures.success(analysis.outcomes(inputs.problems, scenes)),
+        "scalability": figures.scalability(
+            inputs.scalability, inputs.timing, params.compare_scalability.max_tree_size
+        ),
+        "learning_curves": figures.learning_curves(
+            {name: report["curves"] for name, report in sub_policies.items()}
+        ),
+        "confusion": figures.confusion(
+            {
+                name: (report["classes"], np.array(report["confusion"]))
+                for name, report in sub_policies.items()
+            }
+        ),
+        "feasible_share": figures.feasible_share(analysis.by_last_action(inputs.verdicts, scenes)),
+        "failures": figures.failures(analysis.failures(inputs.verdicts, scenes)),
+    }
+
+
+def _replays(
+    inputs: Inputs, bounds: BoundsParams, reports: Path
+) -> list[tuple[str, str]]:
+    """Write a replay of one plan per setup: the first of guided search on its last problem."""
+    written = []
+    solved = inputs.runs[inputs.runs["solved"] & (inputs.runs["planner"] == "guided")]
+    for setup in SETUPS:
+        plans = solved[solved["problem"].str.startswith(setup)]
+        if plans.empty:
+            continue
+        plan = plans.iloc[-1]
+        scene = _scene(inputs, setup, plan["configuration"])
+        motion = SceneBounds(scene, bounds).path(parse_skeleton(plan["skeleton"])).trajectory
+        if motion is None:
+            continue
+        replay_html(motion, scene, reports / "replays" / f"{setup}.html")
+        written.append(
+            (f"replays/{setup}.html", f"Problem {plan['problem']}: {plan['objective']}, {len(parse_skeleton(plan['skeleton']))} actions")
+        )
+    return written
+
+
+def _scene(inputs: Inputs, setup: str, name: str) -> Scene:
+    return next(s for s in inputs.scenes[f"scalability_{setup}"].scenes if s.name == name)

@@ -20,6 +20,8 @@ _ROWS = {
     "no_solution": "No solution",
     "reattempt_infeasible": "Reattempts: infeasible solution",
     "reattempt_max_depth": "Reattempts: maximum depth",
+    "unsolvable": "No feasible sequence exists",
+    "shortest_without_path": "No shortest sequence has a path",
 }
 _SETS = {"all": "all", "unseen": "unseen"}
 
@@ -88,7 +90,9 @@ def generalization(metrics: Metrics) -> Table:
         (
             "A shortest solution has the minimal number of actions that exhaustive enumeration "
             "finds feasible. Ours are shares of the n problems that are not satisfied at the "
-            "start; the paper's n is its number of configurations times objectives.",
+            "start; the paper's n is its number of configurations times objectives. Reattempts: "
+            "problems with at least one for that cause. A problem counts as without a feasible "
+            "sequence if the enumeration found none up to its longest length.",
         ),
         tuple(groups),
         records=records,
