@@ -45,6 +45,12 @@ class Margins:
     """Box to box."""
     support: float = 0.012
     """Centre of mass to the edge of the support."""
+    approach: float = 0.09
+    """Length of the straight way to a grasp and from a place, along the hand."""
+    lift: float = 0.04
+    """Length of the straight way up after a grasp."""
+    lower: float = 0.08
+    """Length of the straight way down to a place."""
 
 
 @dataclass(frozen=True)
@@ -77,6 +83,17 @@ class Level:
 
 
 @dataclass(frozen=True)
+class Leg:
+    """The far end of a straight segment from a contact, the hand not turned, the pan unchanged."""
+
+    joints: tuple[int, ...]
+    back: float
+    """How far the hand is back along its approach (m)."""
+    up: float
+    """How far it is up (m)."""
+
+
+@dataclass(frozen=True)
 class Posture:
     """An arm that holds a level box: seven joint slots and the box's pose."""
 
@@ -84,6 +101,7 @@ class Posture:
     gripper: str
     joints: tuple[int, ...]
     level: Level
+    legs: tuple[Leg, ...] = ()
     free: bool = False
     """Whether the pose itself is chosen here (a held box presented as a support)."""
 
@@ -276,7 +294,9 @@ class Formulator:
     def _grasp(self, action: Action) -> Snapshot:
         gripper, box = action.gripper, action.box
         mode = self._mode(gripper, box)
-        posture = self._posture(mode, self._level[box])
+        margins = self._margins
+        legs = ((margins.approach, 0.0), (0.0, margins.lift))
+        posture = self._posture(mode, self._level[box], legs)
         contact = self._snapshot({gripper: posture.joints})
         self._avoid(posture, excluded=(box,))
         self._held[box] = mode
@@ -284,7 +304,7 @@ class Formulator:
         if carried:
             for name in (box, *carried):
                 self._level[name] = self._level[name].raised(LIFT)
-            lifted = self._posture(mode, self._level[box])
+            lifted = self._posture(mode, self._level[box], ())
             self._avoid(lifted, excluded=(box,))
             self._joints[gripper] = lifted.joints
         support = self._state.support_of(box)
@@ -321,7 +341,8 @@ class Formulator:
         self._steps[-1].append(placement)
         self._balance(successor(self._state, action), box)
         self._separate((box, *carried), table)
-        posture = self._posture(mode, new)
+        legs = ((0.0, self._margins.lower), (self._margins.approach, 0.0))
+        posture = self._posture(mode, new, legs)
         self._avoid(posture, excluded=(box,))
         for other, joints in self._joints.items():
             if other != gripper:
@@ -352,7 +373,7 @@ class Formulator:
             0.0,
         )
         self._level[root] = level
-        posture = self._posture(mode, level, free=True)
+        posture = self._posture(mode, level, (), free=True)
         self._joints[mode.gripper] = posture.joints
         self._avoid(posture, excluded=(root,))
 
@@ -386,48 +407,63 @@ class Formulator:
         self._steps[-1].append(mode)
         return mode
 
-    def _posture(self, mode: Mode, level: Level, free: bool = False) -> Posture:
-        limits = pr2.JOINT_LIMITS[:7]
-        home = _mirrored(mode.gripper, pr2.HOME[mode.gripper])
-        joints = tuple(
-            self._variable(low, high, 1e-3, at, shared=False)
-            for (low, high), at in zip(limits.tolist(), home, strict=True)
-        )
-        posture = Posture(self._action, mode.gripper, joints, level, free)
+    def _posture(
+        self,
+        mode: Mode,
+        level: Level,
+        legs: tuple[tuple[float, float], ...],
+        free: bool = False,
+    ) -> Posture:
+        """The arm holds its box at a level pose, and can move straight to the ends of the legs."""
+        joints = self._arm_variables(mode, 0)
+        self._hold(mode, joints, level, 0.0, 0.0)
+        ends = []
+        for back, up in legs:
+            end = (joints[0], *self._arm_variables(mode, 1))
+            self._hold(mode, end, level, back, up)
+            ends.append(Leg(end, back, up))
+        posture = Posture(self._action, mode.gripper, joints, level, tuple(ends), free)
         mode.postures.append(posture)
         self._steps[-1].append(posture)
+        return posture
+
+    def _arm_variables(self, mode: Mode, first: int) -> tuple[int, ...]:
+        home = _mirrored(mode.gripper, pr2.HOME[mode.gripper])
+        limits = pr2.JOINT_LIMITS[:7].tolist()
+        return tuple(
+            self._variable(low, high, 1e-3, at, shared=False)
+            for (low, high), at in zip(limits[first:], home[first:], strict=True)
+        )
+
+    def _hold(
+        self, mode: Mode, joints: tuple[int, ...], level: Level, back: float, up: float
+    ) -> None:
+        grasp = (mode.half_length, mode.half_height, mode.turn, back)
         self._instance(
             "hold",
             (*joints, mode.pitch, mode.offset, *level.plane, level.z),
-            (
-                *self._arm(mode.gripper),
-                level.offset,
-                0.0,
-                mode.half_length,
-                mode.half_height,
-                mode.turn,
-                0.0,
-            ),
+            (*self._arm(mode.gripper), level.offset, up, *grasp),
         )
         self._name("reach", mode.gripper, mode.box)
-        return posture
 
     def _avoid(self, posture: Posture, excluded: tuple[str, ...]) -> None:
         """Keep an arm clear of tables, level boxes and the other arm."""
-        for name in self._geometry.tables:
-            self._clear(posture.gripper, posture.joints, name)
-        for name in self._geometry.boxes:
-            held = self._held.get(name)
-            at_side = held is not None and held.gripper not in self._joints
-            if name not in excluded and not at_side:
-                self._clear(posture.gripper, posture.joints, name)
-        (other,) = (gripper for gripper in GRIPPERS if gripper != posture.gripper)
+        gripper = posture.gripper
+        for joints in (posture.joints, *(leg.joints for leg in posture.legs)):
+            for name in self._geometry.tables:
+                self._clear(gripper, joints, name)
+            for name in self._geometry.boxes:
+                held = self._held.get(name)
+                at_side = held is not None and held.gripper not in self._joints
+                if name not in excluded and not at_side:
+                    self._clear(gripper, joints, name)
+        (other,) = (name for name in GRIPPERS if name != gripper)
         self._instance(
             "apart",
             (*posture.joints, *self._joints.get(other, self._home[other])),
-            (SIDES[posture.gripper], SIDES[other], self._torso, self._margins.arms, *RADII),
+            (SIDES[gripper], SIDES[other], self._torso, self._margins.arms, *RADII),
         )
-        self._name("collision", posture.gripper, other)
+        self._name("collision", gripper, other)
 
     def _clear(self, gripper: str, joints: tuple[int, ...], name: str) -> None:
         level = self._level[name]

@@ -10,6 +10,7 @@ import numpy as np
 from guided_lgp.nlp.coarse.formulation import (
     SIDES,
     Formulation,
+    Leg,
     Level,
     Mode,
     Placement,
@@ -125,14 +126,18 @@ class _Draft:
         mode = self._mode_of[item.box, item.action]
         origin = self.pose(mode.postures[0].level)
         pitches = self._pitches(mode)
-        grasp = self._costs(mode, origin[None], pitches)
-        place = self._costs(mode, candidates, pitches)
+        grasp = self._costs(mode, origin[None], mode.postures[0].legs, pitches)
+        place = self._costs(mode, candidates, self._legs_of(mode, item.action), pitches)
         total = (grasp + place).min(axis=1) + overlap
         best = self._choose(total)
         for slot, value in zip(item.level.plane, candidates[best], strict=False):
             self._values[slot] = value
         for before, after in item.carried:
             self._carry(self.pose(item.old), self.pose(before), self.pose(item.level), after)
+
+    def _legs_of(self, mode: Mode, action: int) -> tuple[Leg, ...]:
+        """The straight segments of the last posture of an action."""
+        return next(p.legs for p in reversed(mode.postures) if p.action == action)
 
     def _carry(self, old: Array, before: Array, new: Array, after: Level) -> None:
         turn = new[2] - old[2]
@@ -170,8 +175,9 @@ class _Draft:
         lowest = self._formulation.program.lower[item.level.z]
         candidates[:, 3] = lowest + self._generator.uniform(0.0, 0.1, count)
         pitches = self._pitches(mode)
-        grasp = self._costs(mode, self.pose(mode.postures[0].level)[None], pitches)
-        total = (grasp + self._costs(mode, candidates, pitches)).min(axis=1)
+        first = mode.postures[0]
+        grasp = self._costs(mode, self.pose(first.level)[None], first.legs, pitches)
+        total = (grasp + self._costs(mode, candidates, (), pitches)).min(axis=1)
         best = self._choose(total)
         for slot, value in zip((*item.level.plane, item.level.z), candidates[best], strict=True):
             self._values[slot] = value
@@ -183,54 +189,62 @@ class _Draft:
 
     def _hold(self, mode: Mode) -> None:
         """Choose one pitch for a mode and the joints of its postures."""
-        open_postures = [p for p in mode.postures if p.joints[0] >= self._fixed]
-        if not open_postures:
+        if all(posture.joints[0] < self._fixed for posture in mode.postures):
             return
-        poses = np.array([self.pose(posture.level) for posture in mode.postures])
-        if mode.pitch < self._fixed:
-            pitches = self._values[[mode.pitch]]
-        else:
-            pitches = np.clip(
-                _PITCHES + self._noise * self._generator.uniform(-0.4, 0.4), 0.05, np.pi - 0.05
-            )
-        costs = self._costs(mode, poses, pitches)
-        best = self._choose(costs.sum(axis=0))
+        poses = [self.pose(posture.level) for posture in mode.postures]
+        pitches = self._pitches(mode)
         if mode.pitch >= self._fixed:
-            self._values[mode.pitch] = pitches[best]
+            pitches = pitches + self._noise * self._generator.uniform(-0.4, 0.4)
+            costs = sum(
+                self._costs(mode, pose[None], posture.legs, pitches)[0]
+                for posture, pose in zip(mode.postures, poses, strict=True)
+            )
+            pitches = pitches[[self._choose(np.asarray(costs))]]
+            self._values[mode.pitch] = pitches[0]
         for posture, pose in zip(mode.postures, poses, strict=True):
             if posture.joints[0] >= self._fixed:
-                joints, costs = self._solutions(mode, pose[None], pitches[[best]])
+                joints, costs = self._solutions(mode, pose[None], posture.legs, pitches)
                 chosen = self._choose(costs[0, 0])
-                self._values[list(posture.joints)] = joints[0, 0, chosen]
+                ends = (posture.joints, *(leg.joints for leg in posture.legs))
+                for slots, values in zip(ends, joints[0, 0, :, chosen], strict=True):
+                    self._values[list(slots)] = values
 
     def _choose(self, costs: Array) -> int:
         if self._noise:
             costs = costs + self._noise * self._generator.exponential(1.0, costs.shape)
         return int(np.argmin(costs))
 
-    def _costs(self, mode: Mode, poses: Array, pitches: Array) -> Array:
+    def _costs(self, mode: Mode, poses: Array, legs: tuple[Leg, ...], pitches: Array) -> Array:
         """Least cost (len(poses), len(pitches)) over the shoulder's pan."""
-        return np.asarray(self._solutions(mode, poses, pitches)[1].min(axis=2))
+        return np.asarray(self._solutions(mode, poses, legs, pitches)[1].min(axis=2))
 
-    def _solutions(self, mode: Mode, poses: Array, pitches: Array) -> tuple[Array, Array]:
-        """Inverse kinematics: joints (poses, pitches, pans, 7) and costs (poses, pitches, pans)."""
-        shape = (len(poses), len(pitches), 2 * len(_PANS))
+    def _solutions(
+        self, mode: Mode, poses: Array, legs: tuple[Leg, ...], pitches: Array
+    ) -> tuple[Array, Array]:
+        """Inverse kinematics of a contact and the ends of its legs.
+
+        Returns:
+            joints (poses, pitches, 1 + legs, pans, 7) and costs (poses, pitches, pans).
+        """
+        ends = np.array([(0.0, 0.0), *((leg.back, leg.up) for leg in legs)])
+        shape = (len(poses), len(pitches), len(ends), 2 * len(_PANS))
         arguments = np.empty((*shape, 15))
-        arguments[..., :4] = poses[:, None, None]
-        arguments[..., 4] = pitches[:, None]
+        arguments[..., :4] = poses[:, None, None, None]
+        arguments[..., 4] = pitches[:, None, None]
         arguments[..., 5] = self._values[mode.offset]
         arguments[..., 6] = np.tile(_PANS, 2)
         arguments[..., 7] = np.repeat([1.0, -1.0], len(_PANS))
         arguments[..., 8] = SIDES[mode.gripper]
         arguments[..., 9] = self._torso
-        arguments[..., 10] = 0.0
-        arguments[..., 11:15] = mode.half_length, mode.half_height, mode.turn, 0.0
+        arguments[..., 10] = ends[:, 1, None]
+        arguments[..., 11:14] = mode.half_length, mode.half_height, mode.turn
+        arguments[..., 14] = ends[:, 0, None]
         solutions = self._solver.reach(arguments.reshape(-1, 15)).reshape(*shape, 8)
         joints = solutions[..., :7]
         beyond = np.maximum(_LIMITS[:, 0] - joints, 0) + np.maximum(joints - _LIMITS[:, 1], 0)
         motion = ((joints - _HOME) ** 2)[..., :4].sum(axis=-1)
         costs = 5 * beyond.sum(axis=-1) + 20 * solutions[..., 7] + 0.05 * motion
-        return np.clip(joints, _LIMITS[:, 0], _LIMITS[:, 1]), costs
+        return np.clip(joints, _LIMITS[:, 0], _LIMITS[:, 1]), costs.sum(axis=2)
 
 
 def _separation(
