@@ -27,12 +27,12 @@ SETUPS = "abcd"
 logger = logging.getLogger(__name__)
 
 
-def render(root: Path, params: Params) -> None:
+def run(params: Params, root: Path) -> None:
     """Write ``reports/metrics/training.json`` and the report with its tables, figures and replays.
 
     Args:
-        root: the folder of ``dvc.yaml``.
         params: limits and seeds, which the report names.
+        root: the folder of ``dvc.yaml``.
 
     Raises:
         InputError: an output of an earlier stage is missing; the message names the stage.
