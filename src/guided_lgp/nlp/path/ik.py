@@ -37,15 +37,11 @@ class Arm:
         left = gripper == GRIPPERS[0]
         self.gripper = gripper
         self.home = HOME[gripper]
-        self._sign = np.ones(7) if left else MIRROR
+        self.sign = np.ones(7) if left else MIRROR
         self._mirror = np.diag([1.0, 1.0 if left else -1.0, 1.0])
         self._base = rotation_matrix(base[3:])
         shoulder = self._mirror @ SHOULDER + np.array([0.0, 0.0, scene.robot.torso])
         self.shoulder = base[:3] + self._base @ shoulder
-
-    def pans(self, count: int) -> Array:
-        """Evenly spaced pan angles (count,) inside the limits, in the arm's own sign."""
-        return np.asarray(np.linspace(*_LIMITS[0], count) * self._sign[0])
 
     def inverse(self, rotation: Array, position: Array, pan: Array) -> tuple[Array, Array]:
         """Solve for tool poses.
@@ -61,7 +57,7 @@ class Arm:
         """
         rot = self._mirror @ (self._base.T @ rotation) @ self._mirror
         wrist = ((position - self.shoulder) @ self._base) @ self._mirror - TOOL * rot[..., :, 0]
-        pan = pan * self._sign[0]
+        pan = pan * self.sign[0]
         sin1, cos1 = np.sin(pan), np.cos(pan)
         x = cos1 * wrist[..., 0] + sin1 * wrist[..., 1] - PAN_OFFSET
         y = cos1 * wrist[..., 1] - sin1 * wrist[..., 0]
@@ -101,7 +97,7 @@ class Arm:
         q[..., 2] -= np.where(q[..., 2] > _LIMITS[2, 1], _TURN, 0.0)
         q[..., 1] = (q[..., 1] + np.pi) % _TURN - np.pi
         inside = np.all((q > _LIMITS[:, 0]) & (q < _LIMITS[:, 1]), axis=-1)
-        return q * self._sign, inside & reachable[..., None]
+        return q * self.sign, inside & reachable[..., None]
 
     def forward(self, q: Array) -> tuple[Array, Array]:
         """Rotation (..., 3, 3) and origin (..., 3) of the tool frame in the world.
@@ -109,7 +105,7 @@ class Arm:
         Args:
             q: (..., 7) in rad.
         """
-        c, s = np.cos(q * self._sign), np.sin(q * self._sign)
+        c, s = np.cos(q * self.sign), np.sin(q * self.sign)
         frame = np.broadcast_to(np.eye(3), (*q.shape[:-1], 3, 3))
         frame = _turn(frame, 2, c[..., 0], s[..., 0])
         origin = PAN_OFFSET * frame[..., :, 0]

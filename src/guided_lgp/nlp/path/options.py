@@ -30,7 +30,8 @@ APPROACH = 0.09
 LIFT = 0.08
 """Length (m) of the straight way up after a grasp and down to a place."""
 _UP = np.array([0.0, 0.0, 1.0])
-_PANS = 15
+_PANS = np.linspace(-0.7, 2.28, 15)
+"""Pan angles (rad) of the left arm that are tried for every pose, beside the coarse one."""
 _CONFIGURATIONS = 150
 """Configurations of grip and elbow that are looked at per action and batch of placements."""
 _ELBOWS = 3
@@ -74,6 +75,8 @@ class _Reach:
     """(N, 3) origin of the tool frame (m)."""
     q: Array
     """(N, 2, P, 2, 7): at the contact and off it, by pan angle and side of the elbow."""
+    pans: Array
+    """(P,) rad."""
     cost: Array
     """(N, P, 2): distance of the second from the home posture; infinite out of reach."""
 
@@ -170,7 +173,7 @@ class Options:
         tool = compose(target, inverse(situation.carried[root][1]))
         rotation = rotation_matrix(tool[3:])[None]
         now = situation.q[arm_slice(holder)]
-        reach = self._reach(arm, rotation, tool[None, :3], tool[None, :3], now)
+        reach = self._reach(index, arm, rotation, tool[None, :3], tool[None, :3])
         still = situation.still(holder)
         for _, pan, side in reach.order()[: 2 * _ELBOWS]:
             goal = continuous_near(reach.q[0, 0, pan, side], now)
@@ -205,38 +208,59 @@ class Options:
     # -- Grasps ------------------------------------------------------------------------------
 
     def _grasps(self, index: int, situation: Situation) -> Iterator[Outcome]:
+        central, others = self._grips[self._skeleton[index].box]
+        situation = self._opened(situation, self._skeleton[index].gripper)
+        for alternative in (False, True):
+            for grips in (central + self._coarse_grip(index), others):
+                yield from self._grasps_with(index, situation, grips, alternative)
+
+    def _grasps_with(
+        self, index: int, situation: Situation, grips: Grips, alternative: bool
+    ) -> Iterator[Outcome]:
+        """Grasps with one of a set of grips, for the coarse placement later or for others."""
         action = self._skeleton[index]
         gripper, box = action.gripper, action.box
-        arm, grips = self._arms[gripper], self._grips[box]
-        situation = self._opened(situation, gripper)
+        foresight = self._foresight(index, situation, grips, alternative)
+        if foresight is None:
+            return
         box_pose = situation.boxes(self._arms)[box]
         rotation, contact = grips.tools(box_pose[:3], rotation_matrix(box_pose[3:]))
-        reach = self._reach(arm, rotation, contact, contact - APPROACH * rotation[:, :, 0])
+        off = contact - APPROACH * rotation[:, :, 0]
+        reach = self._reach(index, self._arms[gripper], rotation, contact, off)
         if not np.isfinite(reach.cost).any():
             self._trouble.note(index, 0, f"no inverse kinematics for a grasp of {box}")
             return
         approach, free = situation.still(gripper, [(gripper, box)]), situation.still(gripper)
-        planned = np.zeros(len(contact), dtype=int)
-        for foresight in self._foresights(index, situation, grips):
-            for grip, pan, side in reach.order(foresight.cost)[:_CONFIGURATIONS]:
-                if planned[grip] >= _ELBOWS:
-                    continue
-                at, before = reach.q[grip, :, pan, side]
-                blocked = self._mover.collision(approach, at[None])
-                if blocked is not None:
-                    self._note(index, 1, "grasp collision", blocked)
-                    continue
-                blocked = self._mover.collision(free, before[None])
-                if blocked is not None:
-                    self._note(index, 2, "approach collision", blocked)
-                    continue
-                if not foresight.possible(grip):
-                    continue
-                planned[grip] += 1
-                outcome = self._grasp(index, situation, reach, (grip, pan, side), grips[grip])
-                if outcome is not None:
-                    planned[grip] = _ELBOWS
-                    yield outcome
+        planned = np.zeros(len(grips), dtype=int)
+        for choice in reach.order(foresight.cost)[:_CONFIGURATIONS]:
+            grip, pan, side = choice
+            if planned[grip] >= _ELBOWS:
+                continue
+            at, before = reach.q[grip, :, pan, side]
+            blocked = self._mover.collision(approach, at[None])
+            if blocked is not None:
+                self._note(index, 1, "grasp collision", blocked)
+                continue
+            blocked = self._mover.collision(free, before[None])
+            if blocked is not None:
+                self._note(index, 2, "approach collision", blocked)
+                continue
+            if not foresight.possible(grip):
+                continue
+            planned[grip] += 1
+            outcome = self._grasp(index, situation, reach, choice)
+            if outcome is not None:
+                planned[grip] = _ELBOWS
+                yield outcome
+
+    def _coarse_grip(self, index: int) -> Grips:
+        """The coarse solution's own grip."""
+        action, contact = self._skeleton[index], self._contacts[index]
+        box = contact.boxes[action.box]
+        arm = self._arms[action.gripper]
+        rotation, position = arm.forward(contact.q[arm_slice(action.gripper)])
+        frame = rotation_matrix(box[3:])
+        return Grips((frame.T @ rotation)[None], ((position - box[:3]) @ frame)[None])
 
     def _grasp(
         self,
@@ -244,16 +268,14 @@ class Options:
         situation: Situation,
         reach: _Reach,
         choice: tuple[int, int, int],
-        grip: Grips,
     ) -> Outcome | None:
         """Plan all motions of a grasp, straight lines first."""
         self.attempts += 1
         action, state = self._skeleton[index], situation.state
         gripper, box = action.gripper, action.box
-        arm = self._arms[gripper]
         number, pan, side = choice
         start = situation.q[arm_slice(gripper)]
-        angle = float(arm.pans(_PANS)[pan])
+        angle = float(reach.pans[pan])
         tool = (reach.rotation[number], reach.contact[number])
         before = continuous_near(reach.q[number, 1, pan, side], start)
         line = self._line(
@@ -265,7 +287,7 @@ class Options:
         inward = wound(line[::-1], before)
         reached = self._after(situation, [Motion(gripper, inward)])
         riders = state.carried_by(box)
-        closed = Fingers(gripper, finger_joint(float(grip.width[0])))
+        closed = Fingers(gripper, finger_joint(min(self._boxes[box].size[:2])))
         attach = Attach((box, *riders), gripper)
         held = replace(self._after(reached, [closed, attach]), state=self._states[index + 1])
         support = state.support_of(box)
@@ -301,46 +323,37 @@ class Options:
             return Outcome(steps, final, reached.keyframe(self._arms))
         return None
 
-    def _foresights(
-        self, index: int, situation: Situation, grips: Grips
-    ) -> Iterator["_Foresight"]:
-        """What is known at a grasp about the later place of the box: first with the coarse
-        placement, then with others.
+    def _foresight(
+        self, index: int, situation: Situation, grips: Grips, alternative: bool
+    ) -> "_Foresight | None":
+        """What a grasp must know about the later place of the box, at the coarse placement or
+        at alternative ones; None if there is nothing (else) to know.
         """
         box = self._skeleton[index].box
         later = next(
             (j for j in range(index + 1, len(self._skeleton)) if self._skeleton[j].box == box), None
         )
         if later is None:
-            yield _Foresight(np.zeros(len(grips.width)), lambda grip: True)
-            return
+            return None if alternative else _Foresight(np.zeros(len(grips)), lambda grip: True)
         action = self._skeleton[later]
         assert action.table is not None
         expected = self._expected(index, later, situation)
         support = self._top(action.table, self._contacts[later])
         reference = placement_of(support, self._contacts[later].boxes[box])
-        yield self._foresight(later, expected, support, [reference], grips)
-        others = self._alternatives(later, expected, support, reference)
-        yield self._foresight(later, expected, support, others, grips)
-
-    def _foresight(
-        self,
-        later: int,
-        expected: Situation,
-        support: Array,
-        placements: list[Array],
-        grips: Grips,
-    ) -> "_Foresight":
-        action = self._skeleton[later]
-        arm = self._arms[action.gripper]
-        half_height = self._boxes[action.box].size[2] / 2
+        placements = [reference]
+        if alternative:
+            placements = self._alternatives(later, expected, support, reference)
+        half_height = self._boxes[box].size[2] / 2
         targets = [placed(support, placement, half_height) for placement in placements]
         tools = [grips.tools(target[:3], rotation_matrix(target[3:])) for target in targets]
         rotation = np.concatenate([tool[0] for tool in tools])
         contact = np.concatenate([tool[1] for tool in tools])
-        reach = self._reach(arm, rotation, contact, contact + LIFT * _UP)
-        count = len(grips.width)
-        cost = reach.cost.reshape(len(targets), count, -1)
+        reach = self._reach(
+            later, self._arms[action.gripper], rotation, contact, contact + LIFT * _UP
+        )
+        cost = reach.cost.reshape(len(targets), len(grips), -1).min(axis=(0, 2))
+        if not np.isfinite(cost).any():
+            self._trouble.note(later, 0, f"no inverse kinematics to place {box}")
         known: dict[int, bool] = {}
 
         def possible(grip: int) -> bool:
@@ -348,7 +361,7 @@ class Options:
                 known[grip] = self._place_possible(later, expected, targets, reach, grips, grip)
             return known[grip]
 
-        return _Foresight(cost.min(axis=(0, 2)), possible)
+        return _Foresight(cost, possible)
 
     def _expected(self, index: int, later: int, situation: Situation) -> Situation:
         """The situation expected at a later place, its box and what stands on it left out."""
@@ -379,7 +392,7 @@ class Options:
         assert action.table is not None
         gripper, box = action.gripper, action.box
         arm = self._arms[gripper]
-        count = len(grips.width)
+        count = len(grips)
         grasp = inverse(matrix_pose(grips.rotation[grip], grips.offset[grip]))
         box_pose = self._contacts[later].boxes[box]
         riders = {
@@ -401,7 +414,7 @@ class Options:
             back = arm.inverse(
                 reach.rotation[number],
                 reach.contact[number] - APPROACH * reach.rotation[number][:, 0],
-                arm.pans(_PANS)[pan],
+                reach.pans[pan],
             )
             if not back[1][side]:
                 self._trouble.note(later, 2, "retreat out of reach")
@@ -436,7 +449,7 @@ class Options:
         targets = np.array([placed(support, p, half_height) for p in placements])
         tools = compose(targets, inverse(situation.carried[box][1]))
         rotation, contact = rotation_matrix(tools[:, 3:]), tools[:, :3]
-        reach = self._reach(self._arms[gripper], rotation, contact, contact + LIFT * _UP)
+        reach = self._reach(index, self._arms[gripper], rotation, contact, contact + LIFT * _UP)
         if not np.isfinite(reach.cost).any():
             self._trouble.note(index, 0, f"no inverse kinematics to place {box}")
             return
@@ -471,7 +484,7 @@ class Options:
         gripper, box = action.gripper, action.box
         number, pan, side = choice
         start = situation.q[arm_slice(gripper)]
-        angle = float(self._arms[gripper].pans(_PANS)[pan])
+        angle = float(reach.pans[pan])
         tool = (reach.rotation[number], reach.contact[number])
         riders = state.carried_by(box)
         line = self._line(
@@ -570,15 +583,18 @@ class Options:
     # -- Shared ------------------------------------------------------------------------------
 
     def _reach(
-        self, arm: Arm, rotation: Array, contact: Array, off: Array, near: Array | None = None
+        self, index: int, arm: Arm, rotation: Array, contact: Array, off: Array
     ) -> _Reach:
         """Solve the inverse kinematics of N tool poses at the contact and off it."""
+        q = self._contacts[index].q[arm_slice(arm.gripper)]
+        pans = np.append(_PANS * arm.sign[0], q[0])
         positions = np.stack([contact, off], axis=1)[:, :, None]
-        pans = np.broadcast_to(arm.pans(_PANS), (len(contact), 2, _PANS))
-        q, valid = arm.inverse(rotation[:, None, None], positions, pans)
-        distance = (q[:, 1] - (arm.home if near is None else near)) * REACH
-        cost = np.where(valid.all(axis=1), np.linalg.norm(distance, axis=-1), np.inf)
-        return _Reach(rotation, contact, q, cost)
+        q, valid = arm.inverse(
+            rotation[:, None, None], positions, np.broadcast_to(pans, (len(contact), 2, len(pans)))
+        )
+        distance = np.linalg.norm((q[:, 1] - arm.home) * REACH, axis=-1)
+        cost = np.where(valid.all(axis=1), distance, np.inf)
+        return _Reach(rotation, contact, q, pans, cost)
 
     def _line(
         self, still: Still, tool: tuple[Array, Array], direction: Array, pan: float, side: int

@@ -63,7 +63,7 @@ class LevelSpace:
         self._arm = arm
         self._rotation = rotation
         self._side = side
-        pan = np.sort(arm.pans(2))
+        pan = JOINT_LIMITS[arm_slice(arm.gripper)][0]
         self.low = np.array([*(arm.shoulder - 0.9), -np.pi, pan[0]])
         self.high = np.array([*(arm.shoulder + 0.9), np.pi, pan[1]])
 

@@ -1,8 +1,9 @@
 """Verification of paths."""
 
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise, product
+from itertools import pairwise, product, zip_longest
 
 import numpy as np
 
@@ -70,12 +71,14 @@ def verify_path(world: World, skeleton: Skeleton, trajectory: Trajectory) -> Pat
         skeleton: the actions that the motion carries out.
         trajectory: lists all arm and finger joints.
     """
-    switches = _switches(skeleton, trajectory)
+    switches = _switches(world.scene.state, skeleton, trajectory)
     if isinstance(switches, Violation):
         return PathReport(switches)
     columns = [trajectory.joint_names.index(name) for name in (*pr2.ARM_JOINTS, *_FINGERS)]
     q = trajectory.q[:, columns]
-    fault = _rate_faults(q, trajectory.times) or _finger_faults(world.scene, q, trajectory)
+    fault = _rate_faults(q, trajectory.times) or _finger_faults(
+        world.scene, skeleton, switches, q, trajectory.times
+    )
     if fault is None and np.abs(q[0, :14] - pr2.HOME_CONFIGURATION).max() > START:
         fault = Violation("start", float(np.abs(q[0, :14] - pr2.HOME_CONFIGURATION).max()), 0, 0.0)
     if fault is not None:
@@ -84,7 +87,7 @@ def verify_path(world: World, skeleton: Skeleton, trajectory: Trajectory) -> Pat
     return _walk(world, skeleton, switches, q, trajectory.times)
 
 
-def _switches(skeleton: Skeleton, trajectory: Trajectory) -> list[int] | Violation:
+def _switches(state: State, skeleton: Skeleton, trajectory: Trajectory) -> list[int] | Violation:
     """Index into ``times`` of every action's switch, from the attachments."""
     rows = len(trajectory.times)
     if (
@@ -95,28 +98,44 @@ def _switches(skeleton: Skeleton, trajectory: Trajectory) -> list[int] | Violati
         return Violation("samples", 0.0)
     if not {*pr2.ARM_JOINTS, *_FINGERS} <= set(trajectory.joint_names):
         return Violation("joint names", 0.0)
-    left = sorted(trajectory.attachments, key=lambda attachment: attachment.start)
-    open_attachments: dict[str, Attachment] = {}
+    held: dict[str, Attachment] = {}
     switches: list[int] = []
     for index, action in enumerate(skeleton):
-        attachment = left.pop(0) if action.instruction == "grasp" and left else None
-        if action.instruction == "place":
-            attachment = open_attachments.pop(action.box, None)
-        if attachment is None or (attachment.box, attachment.gripper) != (
-            action.box,
-            action.gripper,
-        ):
-            return Violation("attachments", 0.0, index)
         if action.instruction == "grasp":
-            open_attachments[action.box] = attachment
-            switches.append(attachment.start)
+            later = [
+                attachment
+                for attachment in trajectory.attachments
+                if (attachment.box, attachment.gripper) == (action.box, action.gripper)
+                and attachment.start >= (switches[-1] if switches else 0)
+            ]
+            if not later:
+                return Violation("attachments", 0.0, index)
+            held[action.box] = min(later, key=lambda attachment: attachment.start)
+            switches.append(held[action.box].start)
         else:
-            switches.append(attachment.end)
-    bounds = [0, *switches, rows - 1]
-    still_held = all(attachment.end == rows - 1 for attachment in open_attachments.values())
-    if left or not still_held or any(last > then for last, then in pairwise(bounds)):
+            switches.append(held.pop(action.box).end)
+    if any(last > then for last, then in pairwise([0, *switches, rows - 1])) or Counter(
+        trajectory.attachments
+    ) != Counter(_attachments(state, skeleton, switches, rows)):
         return Violation("attachments", 0.0, len(skeleton) - 1)
     return switches
+
+
+def _attachments(
+    state: State, skeleton: Skeleton, switches: Sequence[int], rows: int
+) -> Iterator[Attachment]:
+    """Those of the skeleton: the held boxes, and all that stands on them."""
+    since: dict[str, tuple[str, int]] = {}
+    for action, switch in zip(skeleton, switches, strict=True):
+        state = successor(state, action)
+        carriers = {
+            box: gripper for held, gripper in state.held for box in (held, *state.carried_by(held))
+        }
+        for box in [box for box, (gripper, _) in since.items() if carriers.get(box) != gripper]:
+            yield Attachment(box, *since.pop(box), switch)
+        since |= {box: (gripper, switch) for box, gripper in carriers.items() if box not in since}
+    for box, (gripper, start) in since.items():
+        yield Attachment(box, gripper, start, rows - 1)
 
 
 def _rate_faults(q: Array, times: Array) -> Violation | None:
@@ -144,28 +163,31 @@ def _rate_faults(q: Array, times: Array) -> Violation | None:
     return None
 
 
-def _finger_faults(scene: Scene, q: Array, trajectory: Trajectory) -> Violation | None:
+def _finger_faults(
+    scene: Scene, skeleton: Skeleton, switches: Sequence[int], q: Array, times: Array
+) -> Violation | None:
     """Fingers of one hand that are not parallel, or not closed on the box they carry."""
     sizes = box_sizes(scene)
     for number, gripper in enumerate(GRIPPERS):
         fingers = q[:, 14 + 4 * number : 18 + 4 * number]
         spread = np.ptp(fingers, axis=1)
         if spread.max() > START:
-            time = float(trajectory.times[np.argmax(spread)])
+            time = float(times[np.argmax(spread)])
             return Violation(f"fingers {gripper}", float(spread.max()), time=time)
         arm = q[:, pr2.arm_slice(gripper)]
-        for attachment in trajectory.attachments:
-            if attachment.gripper != gripper:
-                continue
-            rows = slice(attachment.start, attachment.end + 1)
-            at_grasp = np.abs(arm[rows] - arm[attachment.start]).max(axis=1) <= AT_REST
-            at_place = np.abs(arm[rows] - arm[attachment.end]).max(axis=1) <= AT_REST
-            width = min(sizes[attachment.box][:2])
+        turns = [index for index, action in enumerate(skeleton) if action.gripper == gripper]
+        for grasp, place in zip_longest(turns[::2], turns[1::2]):
+            start = switches[grasp]
+            end = len(q) - 1 if place is None else switches[place]
+            rows = slice(start, end + 1)
+            at_grasp = np.abs(arm[rows] - arm[start]).max(axis=1) <= AT_REST
+            at_place = np.abs(arm[rows] - arm[end]).max(axis=1) <= AT_REST
+            width = min(sizes[skeleton[grasp].box][:2])
             target = pr2.finger_joint(width), pr2.finger_joint(width + SQUEEZE)
             play = np.abs(fingers[rows, 0] - target[0]) - (target[1] - target[0])
             play[at_grasp | at_place] = 0.0
             if play.max() > 0:
-                time = float(trajectory.times[attachment.start + np.argmax(play)])
+                time = float(times[start + np.argmax(play)])
                 return Violation(f"fingers {gripper}", float(play.max()), time=time)
     return None
 
