@@ -3,6 +3,7 @@
 import json
 from dataclasses import dataclass
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -122,9 +123,10 @@ def load_dataset(directory: Path) -> Dataset:
     remedy = f"the output of the stage {_STAGE}"
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+        stored = document["encoding"]
+    except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(str(path), f"cannot be read: {error}", remedy) from None
-    encoding = Encoding.parse(document.get("encoding"), str(path), _STAGE)
+    encoding = Encoding.parse(stored, str(path), _STAGE)
     path = directory / _SAMPLES
     try:
         with np.load(path, allow_pickle=False) as arrays:
@@ -140,5 +142,5 @@ def load_dataset(directory: Path) -> Dataset:
             configurations=tuple(document["configurations"]),
             **samples,
         )
-    except (OSError, ValueError, KeyError, TypeError, EOFError) as error:
+    except (OSError, ValueError, KeyError, TypeError, EOFError, BadZipFile) as error:
         raise InputError(str(path), f"cannot be read: {error}", remedy) from None

@@ -97,9 +97,9 @@ def _sizes(document: Any, network: str, encoding: Encoding) -> dict[str, list[in
     try:
         sizes = {name: list(map(int, document["sub_policies"][name])) for name in CHAINS[network]}
         ends = [(widths[0], widths[-1]) for widths in sizes.values()]
-        document["training"]
     except (KeyError, IndexError, TypeError, ValueError):
         return None
     classes = [encoding.classes(name) for name in CHAINS[network]]
     expected = list(zip(encoding.chain_inputs(network), classes, strict=True))
-    return sizes if ends == expected and document.get("network") == network else None
+    fits = ends == expected and document.get("network") == network and "training" in document
+    return sizes if fits else None

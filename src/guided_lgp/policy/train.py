@@ -100,7 +100,7 @@ def train_network(
             sub_policy=sub_policy,
             split=split,
             dataset=dataset,
-            validation=_validation(dataset, split, settings),
+            validation=validation_samples(dataset, split, settings),
             settings=own,
             patience=settings.patience,
             seed=np.random.SeedSequence([settings.seed, list(CHAINS).index(network), index]),
@@ -163,7 +163,7 @@ def _train(task: _Task) -> Fit:
     return result
 
 
-def _validation(dataset: Dataset, split: str, settings: TrainPolicy) -> BoolArray:
+def validation_samples(dataset: Dataset, split: str, settings: TrainPolicy) -> BoolArray:
     """(N,) the samples held out; the same ones for every network."""
     rng = np.random.default_rng(np.random.SeedSequence([settings.seed, SPLITS.index(split)]))
     units = len(dataset) if split == "random" else len(dataset.configurations)

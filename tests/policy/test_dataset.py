@@ -1,0 +1,227 @@
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from synthetic import Enumeration, make_scene, positions_along
+
+from guided_lgp.errors import InputError
+from guided_lgp.logic import (
+    Action,
+    Goal,
+    Objective,
+    State,
+    Symbols,
+    format_objective,
+    progress,
+    satisfied,
+    two_goal_objectives,
+)
+from guided_lgp.policy.dataset import Dataset, load_dataset
+from guided_lgp.policy.encoding import INSTRUCTIONS
+from guided_lgp.policy.samples import build_dataset
+from guided_lgp.policy.split import training_objectives
+
+
+@pytest.fixture(scope="module")
+def objectives(world: Enumeration) -> list[Objective]:
+    return training_objectives(world.scenes[0].symbols, 40, seed=4)
+
+
+@pytest.fixture(scope="module")
+def dataset(world: Enumeration, objectives: list[Objective]) -> Dataset:
+    return build_dataset(world.scenes, world.sequences, world.shortest, objectives, slack=0)
+
+
+def decode_goals(code: np.ndarray, symbols: Symbols) -> Objective:
+    goals = []
+    for kind, box, table in ((g[:2], g[2:5], g[5:]) for g in code.reshape(2, 10)):
+        on = symbols.tables[int(table.argmax())] if table.any() else None
+        goals.append(Goal(("held", "on")[int(kind.argmax())], symbols.boxes[int(box.argmax())], on))
+    return tuple(goals)
+
+
+def decode_action(classes: np.ndarray, symbols: Symbols) -> Action:
+    instruction, gripper, box, table = classes.tolist()
+    on = symbols.tables[table] if table >= 0 else None
+    return Action(INSTRUCTIONS[instruction], symbols.grippers[gripper], symbols.boxes[box], on)
+
+
+def expected_samples(
+    world: Enumeration, objectives: list[Objective], slack: int
+) -> set[tuple[Objective, bytes, Action]]:
+    """The definition of the samples, one by one."""
+    samples = set()
+    for scene in world.scenes:
+        for objective in objectives:
+            shortest = world.shortest_length(scene, objective)
+            for path, end in world.feasible[scene.name].items():
+                if shortest is None or not shortest <= len(path) <= shortest + slack:
+                    continue
+                prefixes = [progress(scene.state, path[:k]) for k in range(len(path))]
+                if not satisfied(end, objective) or any(satisfied(s, objective) for s in prefixes):
+                    continue
+                for frame, action in zip(positions_along(scene, path), path, strict=False):
+                    state = np.concatenate(list(frame.values())).astype(np.float32).tobytes()
+                    samples |= {(objective, state, action), (objective[::-1], state, action)}
+    return samples
+
+
+@pytest.mark.parametrize("slack", [0, 1])
+def test_samples_are_those_of_the_definition(
+    world: Enumeration, objectives: list[Objective], slack: int
+) -> None:
+    dataset = build_dataset(world.scenes, world.sequences, world.shortest, objectives, slack)
+    found = {
+        (
+            decode_goals(dataset.goals[goals], dataset.symbols),
+            dataset.states[state].tobytes(),
+            decode_action(dataset.actions[state], dataset.symbols),
+        )
+        for state, goals in zip(dataset.sample_state, dataset.sample_goals, strict=True)
+    }
+    assert found == expected_samples(world, objectives, slack)
+
+
+def test_each_step_is_a_sample_once_per_order_of_the_goals(
+    world: Enumeration, objectives: list[Objective], dataset: Dataset
+) -> None:
+    count = 0
+    for scene in world.scenes:
+        for objective in objectives:
+            shortest = world.shortest_length(scene, objective)
+            lengths = [
+                len(path)
+                for path, end in world.feasible[scene.name].items()
+                if len(path) == shortest and satisfied(end, objective)
+            ]
+            count += 2 * sum(lengths)
+    assert len(dataset) == count > 1000
+    assert len(np.unique(np.stack([dataset.sample_state, dataset.sample_goals]), axis=1).T) == count
+
+
+def test_nothing_of_the_test_sets_leaks(dataset: Dataset, objectives: list[Objective]) -> None:
+    symbols = dataset.symbols
+    encoded = {decode_goals(code, symbols) for code in dataset.goals[dataset.sample_goals]}
+    seen = {frozenset(goals) for goals in encoded}
+    unseen = {frozenset(goals) for goals in two_goal_objectives(symbols)} - set(
+        map(frozenset, objectives)
+    )
+    assert seen <= set(map(frozenset, objectives))
+    assert not seen & unseen
+    assert all(len(goals) == 2 for goals in seen), "one-goal objectives are for testing only"
+
+
+def test_configurations_that_are_not_given_are_not_used(
+    world: Enumeration, objectives: list[Objective]
+) -> None:
+    held_out = world.scenes[-1]
+    dataset = build_dataset(world.scenes[:-1], world.sequences, world.shortest, objectives, slack=0)
+    assert held_out.name not in dataset.configurations
+    start = np.concatenate([np.array(box.position) for box in held_out.boxes]).astype(np.float32)
+    assert not (dataset.states[:, 6:15] == start).all(axis=1).any()
+
+
+def test_tensors_hold_the_true_previous_decisions(dataset: Dataset) -> None:
+    samples = dataset.of_network("place")
+    actions = dataset.actions[dataset.sample_state[samples]]
+    assert (actions[:, 0] == INSTRUCTIONS.index("place")).all()
+    inputs, classes = dataset.tensors("place", "table", samples)
+    assert inputs.shape == (len(samples), 41 + 2 + 3)
+    assert classes.tolist() == actions[:, 3].tolist()
+    assert inputs[:, 41:43].argmax(axis=1).tolist() == actions[:, 1].tolist()
+    assert inputs[:, 43:].argmax(axis=1).tolist() == actions[:, 2].tolist()
+    assert (inputs[:, 41:].sum(axis=1) == 2).all()
+    first, _ = dataset.tensors("place", "gripper", samples)
+    assert (first == inputs[:, :41]).all()
+
+
+def test_networks_share_the_samples_by_instruction(dataset: Dataset) -> None:
+    assert len(dataset.of_network("instruction")) == len(dataset)
+    parts = [dataset.of_network(network) for network in ("grasp", "place")]
+    assert sorted(np.concatenate(parts)) == list(range(len(dataset)))
+
+
+def test_saved_twice_the_bytes_are_equal_and_come_back(dataset: Dataset, tmp_path: Path) -> None:
+    for folder in ("one", "two"):
+        dataset.save(tmp_path / folder)
+    for name in ("samples.npz", "dataset.json"):
+        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
+    loaded = load_dataset(tmp_path / "one")
+    for name, value in vars(dataset).items():
+        if isinstance(value, np.ndarray):
+            assert value.dtype == getattr(loaded, name).dtype
+            assert (value == getattr(loaded, name)).all()
+        else:
+            assert value == getattr(loaded, name)
+
+
+def test_missing_and_damaged_data_sets_name_the_stage(dataset: Dataset, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"dataset\.json: .*build_dataset"):
+        load_dataset(tmp_path)
+    dataset.save(tmp_path)
+    samples = (tmp_path / "samples.npz").read_bytes()
+    for damaged in (samples[:100], b"", b"text"):
+        (tmp_path / "samples.npz").write_bytes(damaged)
+        with pytest.raises(InputError, match=r"samples\.npz: .*build_dataset"):
+            load_dataset(tmp_path)
+    document = json.loads((tmp_path / "dataset.json").read_text())
+    document["encoding"]["version"] = 99
+    (tmp_path / "dataset.json").write_text(json.dumps(document))
+    with pytest.raises(InputError, match=r"encoding\.version: is 99.*build_dataset"):
+        load_dataset(tmp_path)
+
+
+def test_sequences_that_do_not_fit_the_scenes_are_refused(
+    world: Enumeration, objectives: list[Objective], tmp_path: Path
+) -> None:
+    other = make_scene("other", np.random.default_rng(0))
+    with pytest.raises(InputError, match=r"lacks other .*enumerate_sequences"):
+        build_dataset([other], world.sequences, world.shortest, objectives, 0)
+
+    absent = tmp_path / "absent.parquet"
+    with pytest.raises(InputError, match=r"absent\.parquet: .*enumerate_sequences"):
+        build_dataset(world.scenes, absent, world.shortest, objectives, 0)
+
+    short = tmp_path / "short.parquet"
+    frame = pd.read_parquet(world.sequences)
+    frame["states"] = [None if row is None else row[:-1] for row in frame["states"]]
+    frame.to_parquet(short)
+    with pytest.raises(InputError, match=r"short\.parquet: states of train-000.*numbers"):
+        build_dataset(world.scenes, short, world.shortest, objectives, 0)
+
+    none = tmp_path / "none.parquet"
+    pd.read_parquet(world.sequences).assign(feasible=False).to_parquet(none)
+    with pytest.raises(InputError, match="no training objective has a feasible sequence"):
+        build_dataset(world.scenes, none, world.shortest, objectives, 0)
+
+
+def test_training_needs_the_symbols_of_setup_a(
+    world: Enumeration, objectives: list[Objective]
+) -> None:
+    scene = world.scenes[0]
+    fewer = scene.model_copy(update={"boxes": scene.boxes[:2]})
+    with pytest.raises(InputError, match="2 boxes"):
+        build_dataset([fewer], world.sequences, world.shortest, objectives, 0)
+    with pytest.raises(InputError, match="other symbols"):
+        build_dataset([scene, fewer], world.sequences, world.shortest, objectives, 0)
+
+
+def test_an_objective_that_holds_at_the_start_gives_no_samples(
+    world: Enumeration, objectives: list[Objective], dataset: Dataset
+) -> None:
+    trivial = [
+        (index, objective)
+        for index, scene in enumerate(world.scenes)
+        for objective in objectives
+        if satisfied(State.of(dict(scene.state.support)), objective)
+    ]
+    assert trivial, "the world has such pairs"
+    configuration = dataset.configuration[dataset.sample_state]
+    texts = [
+        format_objective(decode_goals(code, dataset.symbols))
+        for code in dataset.goals[dataset.sample_goals]
+    ]
+    pairs = set(zip(configuration.tolist(), texts, strict=True))
+    assert not pairs & {(index, format_objective(objective)) for index, objective in trivial}

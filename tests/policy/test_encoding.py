@@ -1,0 +1,144 @@
+import numpy as np
+import pytest
+
+from guided_lgp.errors import InputError
+from guided_lgp.logic import Action, State, Symbols, parse_objective
+from guided_lgp.policy.encoding import CHAINS, Encoding
+
+ENCODING = Encoding()
+ON_TABLES = State.of({"red": "tab1", "green": "tab1", "blue": "tab2"})
+MANY = Symbols(("pr2L", "pr2R"), ("red", "green", "blue", "pink", "grey"), ("tab1", "tab2", "tray"))
+ON_TAB1 = State.of(dict.fromkeys(MANY.boxes, "tab1"))
+
+
+def test_sizes() -> None:
+    assert (ENCODING.goal_size, ENCODING.state_size, ENCODING.input_size) == (10, 21, 41)
+    assert len(ENCODING.input_names) == len(set(ENCODING.input_names)) == 41
+    assert [ENCODING.chain_inputs(network) for network in CHAINS] == [[41], [41, 43], [41, 43, 46]]
+
+
+@pytest.mark.parametrize(
+    ("goals", "expected"),
+    [
+        #                held on | red green blue | tab1 tab2 red green blue
+        (["(on red tab2)", "(held blue)"], "01 100 01000  10 001 00000"),
+        (["(held blue)", "(on red tab2)"], "10 001 00000  01 100 01000"),
+        (["(on green red)", "(on blue green)"], "01 010 00100  01 001 00010"),
+        (["(on green blue)"], "01 010 00001  01 010 00001"),
+        (["(held red)"], "10 100 00000  10 100 00000"),
+    ],
+)
+def test_goals_by_hand(symbols: Symbols, goals: list[str], expected: str) -> None:
+    slots = ENCODING.fill(parse_objective(goals), ON_TABLES, symbols)
+    code = ENCODING.encode_goals(slots)
+    assert code.tolist() == [float(digit) for digit in expected.replace(" ", "")]
+
+
+def test_state_is_the_position_of_every_symbol_in_order(symbols: Symbols) -> None:
+    names = ("pr2L", "pr2R", "red", "green", "blue", "tab1", "tab2")
+    positions = {name: np.array([i, i + 0.25, i + 0.5]) for i, name in enumerate(names)}
+    shuffled = {name: positions[name] for name in sorted(names)}
+    code = ENCODING.encode_state(ENCODING.fill((), ON_TABLES, symbols), shuffled)
+    assert code.dtype == np.float32
+    assert code.tolist() == [
+        *(0, 0.25, 0.5, 1, 1.25, 1.5),
+        *(2, 2.25, 2.5, 3, 3.25, 3.5, 4, 4.25, 4.5),
+        *(5, 5.25, 5.5, 6, 6.25, 6.5),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("action", "classes"),
+    [
+        ("(grasp pr2L green)", (0, 0, 1, -1)),
+        ("(grasp pr2R red)", (0, 1, 0, -1)),
+        ("(place pr2R blue tab1)", (1, 1, 2, 0)),
+        ("(place pr2L red tab2)", (1, 0, 0, 1)),
+        ("(place pr2L green blue)", (1, 0, 1, 4)),
+    ],
+)
+def test_actions_by_hand(symbols: Symbols, action: str, classes: tuple[int, ...]) -> None:
+    slots = ENCODING.fill((), ON_TABLES, symbols)
+    assert ENCODING.encode_action(slots, Action.parse(action)) == classes
+
+
+def test_what_fits_stays_as_it_is(symbols: Symbols) -> None:
+    state = State.of({"red": "tab1", "green": "tab1"}, {"blue": "pr2R"})
+    objective = parse_objective(["(on blue green)", "(on green tab2)"])
+    slots = ENCODING.fill(objective, state, symbols)
+    assert slots.goals == objective
+    assert slots.symbols == (*symbols.grippers, *symbols.boxes, *symbols.surfaces)
+
+
+def test_of_many_goals_two_unsatisfied_ones_supports_first() -> None:
+    objective = parse_objective(
+        ["(on red green)", "(on green blue)", "(on blue tray)", "(on pink tab1)"]
+    )
+    slots = ENCODING.fill(objective, ON_TAB1, MANY)
+    assert slots.goals == parse_objective(["(on blue tray)", "(on green blue)"])
+    assert slots.boxes == ("red", "green", "blue")
+
+    later = State.of({**dict(ON_TAB1.support), "blue": "tray", "green": "blue"})
+    assert ENCODING.fill(objective, later, MANY).goals == parse_objective(["(on red green)"])
+
+
+def test_goals_that_name_more_than_three_boxes_become_one_goal() -> None:
+    objective = parse_objective(["(on red green)", "(on blue pink)"])
+    assert ENCODING.fill(objective, ON_TAB1, MANY).goals == objective[:1]
+    later = State.of({**dict(ON_TAB1.support), "red": "green"})
+    assert ENCODING.fill(objective, later, MANY).goals == objective[1:]
+
+
+def test_boxes_of_the_goals_then_held_ones_then_others() -> None:
+    state = State.of(
+        {"red": "tab1", "green": "tab1", "blue": "tab1", "pink": "tab1"}, {"grey": "pr2L"}
+    )
+    objective = parse_objective(["(on pink tray)"])
+    slots = ENCODING.fill(objective, state, MANY)
+    # red has a slot of its own; pink and grey take those of green and blue
+    assert slots.boxes == ("red", "pink", "grey")
+    assert ENCODING.encode_action(slots, Action("grasp", "pr2R", "green")) is None
+    assert ENCODING.encode_action(slots, Action("place", "pr2L", "grey", "green")) is None
+    assert ENCODING.encode_action(slots, Action("place", "pr2L", "grey", "pink")) == (1, 0, 2, 3)
+
+
+@pytest.mark.parametrize(
+    ("goals", "surfaces"),
+    [
+        (["(on red tray)", "(on green tab2)"], ("tray", "tab2")),
+        (["(on red tray)", "(on green red)"], ("tab1", "tray")),
+        (["(on red tab2)"], ("tab1", "tab2")),
+        (["(held red)"], ("tab1", "tab2")),
+    ],
+)
+def test_tables_of_the_goals_first(goals: list[str], surfaces: tuple[str, ...]) -> None:
+    assert ENCODING.fill(parse_objective(goals), ON_TAB1, MANY).surfaces == surfaces
+
+
+def test_slots_without_a_symbol_are_empty_and_zero() -> None:
+    symbols = Symbols(("pr2L", "pr2R"), ("red",), ("tab1",))
+    state = State.of({"red": "tab1"})
+    slots = ENCODING.fill(parse_objective(["(held red)"]), state, symbols)
+    assert slots.symbols == ("pr2L", "pr2R", "red", None, None, "tab1", None)
+    positions = {name: np.ones(3) for name in ("pr2L", "pr2R", "red", "tab1")}
+    code = ENCODING.encode_state(slots, positions).reshape(7, 3)
+    assert code.tolist() == [[float(name is not None)] * 3 for name in slots.symbols]
+
+
+def test_document_comes_back() -> None:
+    for encoding in (ENCODING, Encoding(boxes=5)):
+        assert Encoding.parse(encoding.document(), "x.json", "train_policy") == encoding
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"version": 0}, {"slots": {"boxes": 4}}, {"slots": {"legs": 2}}, {"inputs": []}, {"slots": 3}],
+)
+def test_documents_of_another_encoding_are_refused(change: dict[str, object]) -> None:
+    with pytest.raises(InputError, match=r"x\.json: encoding.*train_policy"):
+        Encoding.parse(ENCODING.document() | change, "x.json", "train_policy")
+
+
+def test_something_else_is_refused() -> None:
+    with pytest.raises(InputError, match=r"x\.json: encoding.*train_policy"):
+        Encoding.parse([1], "x.json", "train_policy")
