@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Collection, Mapping
+from typing import Any
 
 import pandas as pd
 
@@ -34,10 +35,18 @@ def outcomes(problems: pd.DataFrame, scenes: Mapping[str, Scene]) -> pd.DataFram
     return counted[["planner", "outcome"]].assign(kind=kinds)
 
 
-def by_length(verdicts: pd.DataFrame) -> pd.DataFrame:
-    """Sequences tried and the share infeasible: columns split, length, n, infeasible_share."""
-    groups = verdicts.groupby(["split", "length"])["feasible"]
-    return pd.DataFrame({"n": groups.size(), "infeasible_share": 1 - groups.mean()}).reset_index()
+def by_length(verdicts: pd.DataFrame) -> list[dict[str, Any]]:
+    """Sequences tried and the share infeasible: keys split, length, n, infeasible_share."""
+    groups: Any = verdicts.groupby(["split", "length"])["feasible"]
+    return [
+        {
+            "split": split,
+            "length": int(length),
+            "n": len(group),
+            "infeasible_share": 1.0 - float(group.mean()),
+        }
+        for (split, length), group in groups
+    ]
 
 
 def by_last_action(verdicts: pd.DataFrame, scenes: Mapping[str, Scene]) -> pd.DataFrame:
@@ -91,7 +100,7 @@ def failures(verdicts: pd.DataFrame, scenes: Mapping[str, Scene]) -> pd.DataFram
 
 
 def constraint_kind(constraint: str, scene: Scene) -> str:
-    """A constraint without names: ``collision l_forearm_link tab2`` is ``collision robot–table``."""
+    """A constraint without names, such as ``collision robot–table`` for one between two bodies."""
     kinds = {table.name: "table" for table in scene.tables} | {b.name: "box" for b in scene.boxes}
     words = constraint.split()
     bodies = [kinds.get(word) or ("robot" if "_link" in word else None) for word in words]

@@ -28,7 +28,7 @@ DIFFERENCES = (
     "Problems that are satisfied at the start are counted apart; the paper does not say whether "
     "they are in its averages.",
     "Tree size counts every node generated, the root included, over all attempts.",
-    "Each problem of Table III is solved in several configurations; the paper uses one.",
+    "Each problem of Table III is solved in several initial configurations; the paper uses one.",
     "The paper's times were measured on its own machine, so only their growth compares.",
 )
 """Where this work departs from the paper, or had to choose."""
@@ -50,37 +50,40 @@ def compose(
         setups: letters of the setups that have a picture ``setup_<letter>.png``.
         replays: (address, text) of every replay.
     """
-    generalization = [
+    generalization: list[Block] = [
         Bullets(findings.generalization(inputs.generalization)),
         tables["table_1"],
         Picture(
             "success.svg",
-            "Outcomes by type of objective over the test configurations; n: problems not "
-            "satisfied at the start, per planner.",
+            "Outcomes by type of objective",
+            "Test configurations; n: problems not satisfied at the start, per planner.",
         ),
     ]
-    scalability = [
+    scalability: list[Block] = [
         Bullets(findings.scalability(inputs.scalability, inputs.timing)),
         tables["table_3_tree_size"],
         tables["table_3_time"],
         Picture(
             "scalability.svg",
-            "Tree size and time to the first plan against the smallest number of actions, means "
-            "and standard deviations over the problems of Table III (n there). Open markers: the "
-            "paper's means. Crosses: stopped at the limit of the tree size.",
+            "Tree size and time against the smallest number of actions",
+            "Means and standard deviations over the problems of Table III (n there), slightly "
+            "shifted sideways to keep planners apart. Open markers: the paper's means. Crosses: "
+            "stopped at the limit of the tree size (dotted).",
         ),
         tables["table_3_details"],
     ]
-    policy = [
+    policy: list[Block] = [
         tables["training"],
         Picture(
             "learning_curves.svg",
-            "Loss and accuracy by epoch; the validation samples are those of the weights kept.",
+            "Learning curves",
+            "Training with dropout, validation without, on the randomly chosen samples.",
         ),
         Picture(
             "confusion.svg",
-            "Confusion of each sub-policy on its validation samples (%), rows normalised. Where "
-            "several actions are right, an entry off the diagonal need not be a mistake.",
+            "Confusion of each sub-policy",
+            "Validation samples in %, rows normalised. Where several actions are right, an entry "
+            "off the diagonal need not be a mistake.",
         ),
     ]
     geometry: list[Block] = [
@@ -88,13 +91,15 @@ def compose(
         tables["enumeration"],
         Picture(
             "feasible_share.svg",
+            "Feasible share by arm and table",
             "Share of sequences that stay feasible with one more action, by the arm of that "
-            "action and where it takes the box from or puts it.",
+            "action and where it takes the box from or puts it. Training and test configurations.",
         ),
         Picture(
             "failures.svg",
-            "Why sequences fail the coarse bound: the constraint that stays violated, by the "
-            "action at which it does. Training and test configurations.",
+            "Where plans fail and why",
+            "Sequences infeasible for the coarse bound by the constraint that stays violated and "
+            "the action at which it does. Training and test configurations.",
         ),
     ]
     if "geometry" in tables:

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
@@ -25,7 +26,8 @@ class Picture:
 
     file: str
     """Its name there, an SVG or PNG file."""
-    caption: str
+    title: str
+    caption: str = ""
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,16 @@ class Links:
 
     items: Sequence[tuple[str, str]]
 
+
+_KINDS = {
+    "paragraph": str,
+    "bullets": Bullets,
+    "table": Table,
+    "picture": Picture,
+    "gallery": Gallery,
+    "links": Links,
+}
+"""How the templates call the kinds of blocks."""
 
 Block = str | Bullets | Table | Picture | Gallery | Links
 
@@ -87,9 +99,8 @@ class Document:
             lstrip_blocks=True,
             keep_trailing_newline=True,
         )
-        kinds = {"paragraph": str, "bullets": Bullets, "table": Table, "picture": Picture}
-        for name, kind in (kinds | {"gallery": Gallery, "links": Links}).items():
-            environment.tests[name] = partial(_is, kind)
+        tests: dict[str, Any] = {name: partial(_is, kind) for name, kind in _KINDS.items()}
+        environment.tests.update(tests)
         environment.globals["embed"] = lambda file: _embed(folder / "figures" / file)
         environment.filters["plain"] = plain
         return environment.get_template(template).render(document=self)

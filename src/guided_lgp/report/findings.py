@@ -3,9 +3,9 @@
 from collections.abc import Iterator
 
 from guided_lgp.report import paper
-from guided_lgp.report.style import PLANNERS, VARIANTS
 from guided_lgp.report.inputs import Metrics
-from guided_lgp.report.tables import number, percent
+from guided_lgp.report.style import PLANNERS, VARIANTS
+from guided_lgp.report.tables import number, percent, search_time
 
 GUIDED = ("guided", "guided_best_first", "relational")
 RIVALS = ("breadth_first", "breadth_first_graph", "astar")
@@ -36,13 +36,13 @@ def generalization(metrics: Metrics) -> list[str]:
 
 def scalability(metrics: Metrics, timing: Metrics) -> list[str]:
     """How guided search compares with breadth-first, and where a rival beats it."""
-    sentences = list(_against_breadth_first(metrics))
+    sentences = list(_against_breadth_first(metrics, timing))
     sentences += [_unsolved(metrics)]
-    for quantity, key, source in (
-        ("generates fewer nodes", "tree_size_mean", metrics),
-        ("needs less time", "time_mean_s", timing),
+    for quantity, key, source, unit in (
+        ("generates fewer nodes", "tree_size_mean", metrics, ""),
+        ("needs less time", "time_mean_s", timing, " s"),
     ):
-        beaten = list(_beaten(metrics, source, key, quantity))
+        beaten = list(_beaten(metrics, source, key, quantity, unit))
         sentences += beaten or [
             f"No rival (breadth-first, graph breadth-first, A*) {quantity} than guided search on "
             "any problem that it solves completely."
@@ -50,8 +50,8 @@ def scalability(metrics: Metrics, timing: Metrics) -> list[str]:
     return sentences
 
 
-def _against_breadth_first(metrics: Metrics) -> Iterator[str]:
-    ratios, limited = [], []
+def _against_breadth_first(metrics: Metrics, timing: Metrics) -> Iterator[str]:
+    ratios, faster, limited = [], [], []
     for problem in paper.PROBLEMS:
         cells = metrics.get(problem.name, {})
         if not {"breadth_first", "guided"} <= cells.keys():
@@ -63,8 +63,16 @@ def _against_breadth_first(metrics: Metrics) -> Iterator[str]:
             )
         elif guided:
             ratios.append(f"{number(tree['tree_size_mean'] / guided, 0)}× on {problem.name}")
+        slow, fast = (search_time(timing[problem.name][p]) for p in ("breadth_first", "guided"))
+        if slow and fast:
+            faster.append(f"{number(slow / fast)}× on {problem.name}")
     if ratios:
         yield f"The breadth-first tree is larger than the guided one by {_join(ratios)}."
+    if faster:
+        yield (
+            "Guided search without the path bound (symbolic, policy and coarse time) is faster "
+            f"than breadth-first by {_join(faster)}; a factor below 1 means slower."
+        )
     if limited:
         yield f"Breadth-first met the limit of the tree size on {_join(limited)}."
 
@@ -83,7 +91,7 @@ def _unsolved(metrics: Metrics) -> str:
     return f"All problems are solved with a verified path by: {_join(guided)}."
 
 
-def _beaten(metrics: Metrics, source: Metrics, key: str, quantity: str) -> Iterator[str]:
+def _beaten(metrics: Metrics, source: Metrics, key: str, quantity: str, unit: str) -> Iterator[str]:
     """Where a rival that solves every problem has a lower mean than guided search."""
     for rival in RIVALS:
         wins = []
@@ -96,8 +104,9 @@ def _beaten(metrics: Metrics, source: Metrics, key: str, quantity: str) -> Itera
             theirs = source[problem.name][rival][key]
             guided = source[problem.name]["guided"][key]
             if guided is None or theirs < guided:
-                ours = number(guided) if guided is not None else "no plan"
-                wins.append(f"{problem.name} ({number(theirs)} against {ours})")
+                decimals = 2 if unit else 1
+                ours = f"{number(guided, decimals)}{unit}" if guided is not None else "no plan"
+                wins.append(f"{problem.name} ({number(theirs, decimals)}{unit} against {ours})")
         if wins:
             yield f"{PLANNERS[rival]} {quantity} than guided search on {_join(wins)}."
 

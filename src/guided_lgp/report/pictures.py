@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from matplotlib.image import imsave
+from PIL import Image
 
 from guided_lgp.scene import Scene
 from guided_lgp.scene.world import Camera, World
@@ -14,4 +14,4 @@ def draw_scene(scene: Scene, path: Path) -> None:
     """Write a PNG picture of the scene's initial configuration; the same scene, the same bytes."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with World(scene) as world:
-        imsave(path, world.render(CAMERA), metadata={"Software": None})
+        Image.fromarray(world.render(CAMERA)).save(path)

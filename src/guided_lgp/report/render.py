@@ -20,7 +20,6 @@ from guided_lgp.report.pictures import draw_scene
 from guided_lgp.report.replay import replay_html
 from guided_lgp.report.style import NETWORKS
 from guided_lgp.report.table import Table
-from guided_lgp.scene import Scene
 
 SETUPS = "abcd"
 
@@ -46,7 +45,11 @@ def run(params: Params, root: Path) -> None:
     write_metrics(root / METRICS / "training.json", training)
     written = {table.name: table for table in _tables(inputs, training)}
     for table in written.values():
-        for suffix, text in (("md", table.markdown()), ("tex", table.latex()), ("csv", table.csv())):
+        for suffix, text in (
+            ("md", table.markdown()),
+            ("tex", table.latex()),
+            ("csv", table.csv()),
+        ):
             (reports / "tables" / f"{table.name}.{suffix}").write_text(text, encoding="utf-8")
     for name, figure in _figures(inputs, params).items():
         figures.save(figure, reports / "figures", name)
@@ -100,27 +103,24 @@ def _figures(inputs: Inputs, params: Params) -> Mapping[str, Figure]:
     }
 
 
-def _replays(
-    inputs: Inputs, bounds: BoundsParams, reports: Path
-) -> list[tuple[str, str]]:
-    """Write a replay of one plan per setup: the first of guided search on its last problem."""
+def _replays(inputs: Inputs, bounds: BoundsParams, reports: Path) -> list[tuple[str, str]]:
+    """Write a replay per setup, of guided search's last plan; returns (address, description)."""
     written = []
     solved = inputs.runs[inputs.runs["solved"] & (inputs.runs["planner"] == "guided")]
     for setup in SETUPS:
         plans = solved[solved["problem"].str.startswith(setup)]
         if plans.empty:
             continue
-        plan = plans.iloc[-1]
-        scene = _scene(inputs, setup, plan["configuration"])
-        motion = SceneBounds(scene, bounds).path(parse_skeleton(plan["skeleton"])).trajectory
-        if motion is None:
-            continue
-        replay_html(motion, scene, reports / "replays" / f"{setup}.html")
-        written.append(
-            (f"replays/{setup}.html", f"Problem {plan['problem']}: {plan['objective']}, {len(parse_skeleton(plan['skeleton']))} actions")
-        )
+        problem, configuration, objective, skeleton = plans.iloc[-1][
+            ["problem", "configuration", "objective", "skeleton"]
+        ]
+        scenes = inputs.scenes[f"scalability_{setup}"].scenes
+        scene = next(scene for scene in scenes if scene.name == configuration)
+        # The evaluation keeps sequences, not motions; a bound gives the same motion again.
+        actions = parse_skeleton(skeleton)
+        trajectory = SceneBounds(scene, bounds).path(actions).trajectory
+        if trajectory is not None:
+            address = f"replays/{setup}.html"
+            replay_html(trajectory, scene, reports / address)
+            written.append((address, f"Problem {problem}: {objective}, {len(actions)} actions"))
     return written
-
-
-def _scene(inputs: Inputs, setup: str, name: str) -> Scene:
-    return next(s for s in inputs.scenes[f"scalability_{setup}"].scenes if s.name == name)

@@ -3,7 +3,7 @@
 PLANNERS = {
     "breadth_first": "Breadth-first",
     "guided": "Guided",
-    "guided_best_first": "Guided, best-first",
+    "guided_best_first": "Guided best-first",
     "relational": "Relational",
     "breadth_first_graph": "Graph breadth-first",
     "astar": "A*",

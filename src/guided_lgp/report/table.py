@@ -46,7 +46,7 @@ class Table:
         position = 0
         for group, span in self.groups:
             for column in range(position, position + span):
-                headings[column] = " ".join(filter(None, (group, self.columns[column])))
+                headings[column] = ": ".join(filter(None, (group, self.columns[column])))
             position += span
         rule = [":---"] * self.labels + ["---:"] * (len(headings) - self.labels)
         lines = [f"**{plain(self.title)}**", ""]

@@ -1,10 +1,8 @@
 """The tables of the report, each beside the paper's figures where the paper has any."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
-
-import pandas as pd
 
 from guided_lgp.report import paper
 from guided_lgp.report.inputs import Metrics
@@ -117,16 +115,16 @@ def _problems(metrics: Metrics) -> list[paper.Problem]:
 
 
 _QUANTITIES = {
-    "tree_size": ("Table III. Tree size (nodes)", "tree_size_mean", "tree_size_std"),
-    "time": ("Table III. Time until the first plan (s)", "time_mean_s", "time_std_s"),
+    "tree_size": ("Table III. Tree size (nodes)", "tree_size_mean", "tree_size_std", 1),
+    "time": ("Table III. Time to the first plan (s)", "time_mean_s", "time_std_s", 2),
 }
 
 
 def _comparison(quantity: str, metrics: Metrics, figures: Metrics) -> Table:
-    title, mean, std = _QUANTITIES[quantity]
+    title, mean, std, decimals = _QUANTITIES[quantity]
     planners = _planners(metrics)
-    groups: list[tuple[str, int]] = [("", 3)]
-    columns = ["Problem", "K_min", "n"]
+    groups: list[tuple[str, int]] = [("", 2), ("n", 2)]
+    columns = ["Problem", "K_min", "paper", "ours"]
     for planner in planners:
         origins = ["paper", "ours"] if planner in paper.PLANNERS else ["ours"]
         groups.append((PLANNERS[planner], len(origins)))
@@ -138,7 +136,7 @@ def _comparison(quantity: str, metrics: Metrics, figures: Metrics) -> Table:
         for planner in planners:
             if planner in paper.PLANNERS:
                 printed = paper.SCALABILITY[problem.name].get(planner, {})
-                row.append(spread(printed.get(mean), printed.get(std)))
+                row.append(spread(printed.get(mean), printed.get(std), decimals))
                 records.append(
                     _record(problem, planner, "paper", printed.get(mean), printed.get(std))
                     | {"n": problem.objectives}
@@ -150,22 +148,21 @@ def _comparison(quantity: str, metrics: Metrics, figures: Metrics) -> Table:
             shown = figures[problem.name][planner]
             solved, n = cell["problems_solved"], cell["problems"]
             partial = "" if solved == n else f" ({solved}/{n})"
-            row.append(spread(shown[mean], shown[std]) + partial)
+            row.append(spread(shown[mean], shown[std], decimals) + partial)
             records.append(
                 _record(problem, planner, "ours", shown[mean], shown[std])
                 | {"n": n, "solved": solved}
             )
         n = "/".join(map(str, sorted(counts)))
-        rows.append((problem.label, str(problem.k_min), n, *row))
+        rows.append((problem.label, str(problem.k_min), str(problem.objectives), n, *row))
     return Table(
         f"table_3_{quantity}",
         title,
         tuple(columns),
         tuple(rows),
         (
-            "Mean ± standard deviation over the problems solved. n: problems (objectives × "
-            "configurations) given to each planner; the paper's is the number of objectives of "
-            "Table II. (k/n): k of n solved. "
+            "Mean ± standard deviation over the problems solved. n: problems given to each "
+            "planner, objectives × configurations (one in the paper). (k/n): k of n solved. "
             f"{NONE}: stopped at the limit of the tree size on at least one problem. "
             "*: reduced branching factor for breadth-first, as in the paper.",
         ),
@@ -188,6 +185,12 @@ def _record(
     }
 
 
+def search_time(times: Metrics) -> float | None:
+    """Mean time (s) of a search without the path bound: symbolic, policy and coarse."""
+    parts = [times[part] for part in ("symbolic_s", "policy_s", "coarse_s")]
+    return None if None in parts else float(sum(parts))
+
+
 def _details(metrics: Metrics, timing: Metrics) -> Table:
     rows, records = [], []
     parts = ("symbolic_s", "policy_s", "coarse_s", "path_s")
@@ -204,6 +207,7 @@ def _details(metrics: Metrics, timing: Metrics) -> Table:
                     f"{cell['problems_solved']}/{cell['problems']}",
                     number(cell["plan_length_mean"]),
                     *(number(times[part], 3) for part in parts),
+                    number(search_time(times), 3),
                     number(times["peak_rss_mb"], 0),
                 )
             )
@@ -220,10 +224,14 @@ def _details(metrics: Metrics, timing: Metrics) -> Table:
             "Policy (s)",
             "Coarse (s)",
             "Path (s)",
+            "Without path (s)",
             "Peak (MB)",
         ),
         tuple(rows),
-        ("Times are means per problem. Peak: resident memory of the process.",),
+        (
+            "Means over the problems solved; without path: symbolic, policy and coarse. Peak: "
+            "resident memory of the process, libraries included.",
+        ),
         labels=2,
         records=records,
     )
@@ -296,16 +304,16 @@ def training(metrics: Metrics) -> Table:
     )
 
 
-def enumeration(lengths: pd.DataFrame, rejected: Mapping[str, tuple[int, int]]) -> Table:
+def enumeration(lengths: Sequence[Metrics], rejected: Mapping[str, tuple[int, int]]) -> Table:
     """Verdicts of the coarse bound by number of actions.
 
     Args:
-        lengths: columns split, length, n, infeasible_share.
+        lengths: each with split, length, n, infeasible_share.
         rejected: by set of scenes, configurations kept and rejected by the generator.
     """
     rows = [
-        (row.split, str(row.length), f"{row.n:,}", percent(row.infeasible_share))
-        for row in lengths.itertuples()
+        (row["split"], str(row["length"]), f"{row['n']:,}", percent(row["infeasible_share"]))
+        for row in lengths
     ]
     counts = ", ".join(f"{name} {kept} ({out} rejected)" for name, (kept, out) in rejected.items())
     return Table(
@@ -317,14 +325,14 @@ def enumeration(lengths: pd.DataFrame, rejected: Mapping[str, tuple[int, int]]) 
             "Sequences are those that may end in a state of some objective still unsolved and "
             f"have a feasible prefix. Configurations: {counts}.",
         ),
-        records=lengths.to_dict("records"),
+        records=lengths,
     )
 
 
 def geometry(metrics: Metrics) -> Table:
     """Quality and speed of the two bounds of the NLP, by number of actions."""
     lengths = sorted((key for key in metrics if key.isdigit()), key=int)
-    shown = {
+    shown: dict[str, tuple[str, Callable[[Any], str]]] = {
         "coarse_median_ms": ("Coarse bound, median (ms)", lambda v: number(v, 2)),
         "coarse_first_try": ("Coarse bound solved at the first start", percent),
         "false_infeasible": ("Coarse-feasible, not found within the default starts", percent),

@@ -148,7 +148,7 @@ class Viewer:
             )
 
 
-def _pose(transform: Array) -> dict[str, Array]:
+def _pose(transform: Array) -> dict[str, Any]:
     """The arguments by which viser takes a pose (7,)."""
     return {"position": transform[:3], "wxyz": transform[[6, 3, 4, 5]]}
 
