@@ -10,6 +10,7 @@ import os
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict
+from enum import StrEnum
 from importlib import import_module
 from pathlib import Path
 from typing import Annotated
@@ -29,11 +30,25 @@ app = typer.Typer(
 STAGES = {
     "generate_scenes": "guided_lgp.experiments.generate_scenes",
     "enumerate_sequences": "guided_lgp.experiments.enumerate_sequences",
+    "build_dataset": "guided_lgp.experiments.build_dataset",
+    "train_policy": "guided_lgp.experiments.train_policy",
+    "evaluate_generalization": "guided_lgp.experiments.evaluate_generalization",
+    "compare_scalability": "guided_lgp.experiments.compare_scalability",
+    "render_reports": "guided_lgp.report.render",
 }
 """The module of each stage of dvc.yaml; its ``run(params, root)`` does the work."""
 
 mlflow_app = typer.Typer(help="The MLflow dashboard of pipeline runs.", no_args_is_help=True)
 app.add_typer(mlflow_app, name="mlflow")
+
+
+class Network(StrEnum):
+    """The networks of the policy."""
+
+    INSTRUCTION = "instruction"
+    GRASP = "grasp"
+    PLACE = "place"
+
 
 AsJson = Annotated[bool, typer.Option("--json", help="Write JSON to standard output.")]
 ParamsFile = Annotated[Path, typer.Option(help="File with the parameters of all stages.")]
@@ -84,6 +99,54 @@ def enumerate_sequences(params: ParamsFile = PARAMS) -> None:
     Example: guided-lgp enumerate_sequences
     """
     _run_stage("enumerate_sequences", params)
+
+
+@app.command("build_dataset")
+def build_dataset(params: ParamsFile = PARAMS) -> None:
+    """Turn the sequences of the drawn training objectives into samples: data/dataset.
+
+    Example: guided-lgp build_dataset
+    """
+    _run_stage("build_dataset", params)
+
+
+@app.command("train_policy")
+def train_policy(
+    network: Annotated[Network, typer.Argument(help="Which of the three networks.")],
+    params: ParamsFile = PARAMS,
+) -> None:
+    """Train one network of the policy: models, reports/training.
+
+    Example: guided-lgp train_policy place
+    """
+    _run_stage("train_policy", params, network.value)
+
+
+@app.command("evaluate_generalization")
+def evaluate_generalization(params: ParamsFile = PARAMS) -> None:
+    """Plan every objective in every test configuration (Table I of the paper).
+
+    Example: guided-lgp evaluate_generalization
+    """
+    _run_stage("evaluate_generalization", params)
+
+
+@app.command("compare_scalability")
+def compare_scalability(params: ParamsFile = PARAMS) -> None:
+    """Compare the planners on seven problems of growing length (Table III of the paper).
+
+    Example: guided-lgp compare_scalability
+    """
+    _run_stage("compare_scalability", params)
+
+
+@app.command("render_reports")
+def render_reports(params: ParamsFile = PARAMS) -> None:
+    """Write the tables, figures, replays and pages: reports/report.html, reports/report.md.
+
+    Example: guided-lgp render_reports
+    """
+    _run_stage("render_reports", params)
 
 
 @mlflow_app.command("ui")

@@ -158,8 +158,8 @@ class _Run:
         tags = {MLFLOW_PARENT_RUN_ID: parent, STAGE_TAG: address, "restored": str(replayed)}
         child = client.create_run(experiment, tags=tags, run_name=address)
         run = cls(client, parent, child.info.run_id)
-        section = address.partition("@")[0]
-        run._log_params(getattr(params, section).model_dump())
+        section = params.model_dump().get(address.partition("@")[0], {})
+        _log_params(client, run._id, section)
         return run
 
     def finish(self, stage: StageFiles) -> None:
@@ -187,9 +187,6 @@ class _Run:
     def _end(self, status: str) -> None:
         self._client.set_terminated(self._id, status)
         self._client.set_terminated(self._parent, status)
-
-    def _log_params(self, values: Mapping[str, Any]) -> None:
-        _log_params(self._client, self._id, values)
 
 
 def _create_parent(client: Any, experiment: str, params: Params, execution: str) -> str:
@@ -242,6 +239,8 @@ def _read_metrics(file: Path) -> dict[str, list[float]]:
     document = json.loads(file.read_text(encoding="utf-8"))
     metrics = {}
     for name, value in flatten(document if isinstance(document, dict) else {}).items():
+        if name == "version":
+            continue
         values = value if isinstance(value, list) else [value]
         if values and all(_is_number(item) for item in values):
             metrics[name] = [float(item) for item in values]
