@@ -66,6 +66,9 @@ ACCELERATION_LIMITS: Array = 2.0 * VELOCITY_LIMITS
 CONTINUOUS = (4, 6, 11, 13)
 """Indices of the joints without limits in the URDF."""
 
+TORSO_LIMITS = (0.0115, 0.31)
+"""Height of the torso lift (m): above its lower stop, up to the URDF's limit."""
+
 FINGER_JOINTS: dict[str, tuple[str, ...]] = {
     gripper: tuple(
         f"{SIDE[gripper]}_gripper_{joint}_joint"

@@ -294,18 +294,19 @@ class World:
 
     def _filter_pairs(self) -> None:
         """Switch off the pairs that the SRDF disables and those of bodies that never move."""
-        arms = {link for g in GRIPPERS for link in (*pr2.ARM_LINKS[g], *pr2.HAND_LINKS[g])}
         solid = [
             link
             for link, index in self.links.items()
             if pybullet.getCollisionShapeData(self.robot, index, physicsClientId=self.client)
         ]
+        arms = {link for g in GRIPPERS for link in (*pr2.ARM_LINKS[g], *pr2.HAND_LINKS[g])}
+        self.fixed_links = tuple(link for link in solid if link not in arms)
         disabled = pr2.disabled_pairs()
         for one, other in combinations(solid, 2):
             if not {one, other} & arms or frozenset((one, other)) in disabled:
                 self._ignore(self._parts[one], self._parts[other])
         for table in self.tables.values():
-            for link in set(solid) - arms:
+            for link in self.fixed_links:
                 self._ignore(self._parts[link], (table, -1))
 
     def _ignore(self, first: tuple[int, int], second: tuple[int, int]) -> None:

@@ -1,0 +1,88 @@
+"""Each fault of a hand-written scene gets one clear line."""
+
+from typing import Any
+
+import pytest
+
+from guided_lgp.errors import InputError
+from guided_lgp.scene import Scene, generate, parse_scene
+from guided_lgp.scene.validate import validate_scene
+
+
+def document(**changes: Any) -> dict[str, Any]:
+    scene: dict[str, Any] = {
+        "name": "mine",
+        "robot": {"model": "pr2", "base": [0, 0, 0], "torso": 0.28},
+        "tables": [
+            {"name": "tab1", "position": [0.54, 0.33, 0.60], "half_extents": [0.17, 0.20]},
+            {"name": "tab2", "position": [0.54, -0.33, 0.60], "half_extents": [0.17, 0.20]},
+        ],
+        "boxes": [
+            {"name": "red", "size": [0.15, 0.07, 0.10], "position": [0.5, 0.3, 0.65], "on": "tab1"},
+            {
+                "name": "green",
+                "size": [0.15, 0.07, 0.1],
+                "position": [0.5, 0.45, 0.65],
+                "on": "tab1",
+            },
+        ],
+    }
+    for path, value in changes.items():
+        target: Any = scene
+        *keys, last = (int(key) if key.isdigit() else key for key in path.split("__"))
+        for key in keys:
+            target = target[key]
+        target[last] = value
+    return scene
+
+
+def scene(**changes: Any) -> Scene:
+    return parse_scene(document(**changes), "mine.json")
+
+
+def test_good_scene() -> None:
+    validate_scene(scene(), "mine.json")
+
+
+def test_tower_is_a_good_scene() -> None:
+    validate_scene(scene(boxes__1__on="red", boxes__1__position=[0.5, 0.3, 0.75]), "mine.json")
+
+
+@pytest.mark.parametrize("setup", ["a", "b", "c", "d"])
+def test_generated_scenes_are_good(setup: str) -> None:
+    for generated in generate(setup, 2, seed=11, prefix="x").scenes:
+        validate_scene(generated)
+
+
+@pytest.mark.parametrize(
+    ("changes", "fault"),
+    [
+        ({"boxes__1__position": [0.5, 0.33, 0.65]}, "green and red overlap by 0.040 m"),
+        (
+            {"boxes__0__position": [0.5, 0.3, 0.68]},
+            r"boxes\.0 \(red\)\.position: .* floats 0.030 m",
+        ),
+        ({"boxes__0__position": [0.5, 0.3, 0.62]}, r"boxes\.0 \(red\)\.position: .* sunk 0.030 m"),
+        ({"boxes__0__position": [0.5, 0.1, 0.65]}, "not over tab1"),
+        ({"boxes__0__on": "tab2"}, "not over tab2"),
+        ({"boxes__0__size": [0.15, 0.09, 0.10]}, r"cannot close across 0.09 m.*accepted: 0.02"),
+        ({"boxes__0__size": [0.15, 0.01, 0.10]}, "cannot close across 0.01 m"),
+        ({"boxes__0__on": "green", "boxes__1__on": "red"}, "in a circle"),
+        ({"robot__torso": 0.32}, r"robot\.torso: 0.32 m is out of range"),
+        ({"tables__1__position": [0.54, 0.1, 0.6]}, "tab1 and tab2 overlap"),
+        ({"tables__1__position": [0.0, -0.2, 0.6]}, "tab2 is .* inside the robot"),
+        (
+            {
+                "tables__1__position": [1.8, -0.33, 0.6],
+                "boxes__1__position": [1.8, -0.33, 0.65],
+                "boxes__1__on": "tab2",
+            },
+            r"boxes\.1 \(green\): out of both arms' reach",
+        ),
+    ],
+)
+def test_fault_is_named(changes: dict[str, Any], fault: str) -> None:
+    with pytest.raises(InputError, match=fault) as error:
+        validate_scene(scene(**changes), "mine.json")
+    assert str(error.value).startswith("mine.json: ")
+    assert "\n" not in str(error.value)
