@@ -6,6 +6,7 @@ from itertools import chain, islice
 
 from guided_lgp.nlp.coarse import CoarseBound
 from guided_lgp.nlp.path.assembly import assemble
+from guided_lgp.nlp.path.grips import grips_of
 from guided_lgp.nlp.path.motions import Mover
 from guided_lgp.nlp.path.options import Options, Outcome, Trouble
 from guided_lgp.nlp.path.situation import Situation
@@ -40,6 +41,7 @@ class PathBound:
         self._coarse = coarse
         self._solutions = solutions
         self._mover = Mover(scene, _ITERATIONS)
+        self._grips = {box.name: grips_of(box) for box in scene.boxes}
         self._world = World(scene)
         weakref.finalize(self, self._world.close)
 
@@ -62,7 +64,13 @@ class PathBound:
         ):
             tried = number + 1
             options = Options(
-                self._scene, self._mover, skeleton, solution.contacts, trouble, number
+                self._scene,
+                self._mover,
+                self._grips,
+                skeleton,
+                solution.contacts,
+                trouble,
+                number,
             )
             outcomes = self._search(options, len(skeleton), 0, options.start)
             if not isinstance(outcomes, list):

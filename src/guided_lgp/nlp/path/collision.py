@@ -70,9 +70,9 @@ class CollisionChecker:
         for box in scene.boxes:
             self._add(box.name, 0, pin.XYZQUATToSE3(IDENTITY), coal.Box(*box.size))
         self._index = {name: i for i, name in enumerate(self._names)}
-        self._bodies = {
+        self._bodies: dict[str, Any] = {
+            **self._index,
             **{gripper: [self._index[n] for n in HAND_LINKS[gripper]] for gripper in GRIPPERS},
-            **{body.name: [self._index[body.name]] for body in (*scene.tables, *scene.boxes)},
         }
         self._arm = {
             gripper: [self._index[n] for n in ARM_LINKS[gripper] + HAND_LINKS[gripper]]
@@ -114,11 +114,11 @@ class CollisionChecker:
         moves[moving] = True
         active = self._candidates & (moves[:, None] | moves[None, :])
         carried = moving[len(self._arm[mode.gripper]) :]
-        active[np.ix_(carried, carried)] = False
-        for pair in mode.touching:
-            first, second = (self._bodies[name] for name in pair)
-            active[np.ix_(first, second)] = False
-            active[np.ix_(second, first)] = False
+        for body in carried:
+            active[body, carried] = False
+        for one, other in mode.touching:
+            first, second = self._bodies[one], self._bodies[other]
+            active[first, second] = active[second, first] = False
         self._geometry_data.setActiveCollisionPairs(self._geometry, active, True)
 
     def coordinates(self, q: Array, fingers: Mapping[str, float]) -> Array:

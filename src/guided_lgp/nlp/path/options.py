@@ -1,12 +1,12 @@
 """The ways to carry out one action: grips, elbows and placements, tried from the likeliest on."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from guided_lgp.logic import Skeleton, State, successor
-from guided_lgp.nlp.path.grips import Grips, grips_of
+from guided_lgp.nlp.path.grips import Grips
 from guided_lgp.nlp.path.ik import REACH, Arm, continuous_near
 from guided_lgp.nlp.path.motions import Motion, Mover, Still
 from guided_lgp.nlp.path.placements import alternatives, placed, placement_of
@@ -105,6 +105,7 @@ class Options:
         self,
         scene: Scene,
         mover: Mover,
+        grips: Mapping[str, tuple[Grips, Grips]],
         skeleton: Skeleton,
         contacts: Sequence[Keyframe],
         trouble: Trouble,
@@ -118,7 +119,7 @@ class Options:
         self._rng = np.random.default_rng(np.random.SeedSequence([7, seed]))
         self._boxes = {box.name: box for box in scene.boxes}
         self._tables = {table.name: table for table in scene.tables}
-        self._grips = {box.name: grips_of(box) for box in scene.boxes}
+        self._grips = grips
         self._states = [scene.state]
         for action in skeleton:
             self._states.append(successor(self._states[-1], action))

@@ -57,7 +57,8 @@ class Situation:
 
     def boxes(self, arms: Mapping[str, Arm]) -> dict[str, Array]:
         """World pose (7,) of every box."""
-        tools = {gripper: tool_pose(arm, self.q) for gripper, arm in arms.items()}
+        carriers = sorted({gripper for gripper, _ in self.carried.values()})
+        tools = {gripper: tool_pose(arms[gripper], self.q) for gripper in carriers}
         poses = dict(self.standing)
         for box, (gripper, grasp) in self.carried.items():
             poses[box] = compose(tools[gripper], grasp)
