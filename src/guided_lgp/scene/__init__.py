@@ -2,7 +2,6 @@
 
 from guided_lgp.scene.generate import GeneratedScenes, generate, load_scenes
 from guided_lgp.scene.model import GRIPPERS, Box, Robot, Scene, Table, load_scene, parse_scene
-from guided_lgp.scene.validate import validate_scene
 
 __all__ = [
     "GRIPPERS",
@@ -15,5 +14,4 @@ __all__ = [
     "load_scene",
     "load_scenes",
     "parse_scene",
-    "validate_scene",
 ]

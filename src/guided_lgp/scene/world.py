@@ -7,10 +7,10 @@ from types import TracebackType
 from typing import Self
 
 import numpy as np
-import pybullet
 from numpy.typing import NDArray
 
 from guided_lgp.scene import pr2
+from guided_lgp.scene.bullet import pybullet
 from guided_lgp.scene.model import GRIPPERS, Scene, Table
 from guided_lgp.scene.poses import Array, pose
 
