@@ -2,8 +2,8 @@
 
 import time
 import zlib
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from guided_lgp.nlp.coarse.formulation import (
     SIDES,
     Formulation,
     Formulator,
+    Level,
     Margins,
     Mode,
     SceneGeometry,
@@ -79,16 +80,13 @@ class CoarseBound:
 
     def solutions(self, skeleton: Skeleton, count: int) -> Iterator[CoarseResult]:
         """Up to ``count`` further verified solutions from independent starts."""
-        try:
-            formulation = Formulator(self._geometry, Margins()).build(skeleton)
-        except UngraspableError:
-            return
+        programs = _Programs(self._geometry, skeleton)
         found = 0
-        for attempt in range(1, 3 * count + 1):
-            generator = _generator(skeleton, attempt)
-            start = self._starts.draw(formulation, generator, _NOISE)
-            solution = self._solver.solve(formulation.program, start, self._settings)
-            result = self._check(skeleton, formulation, solution, attempt)
+        for attempt in range(self._tries, self._tries + 3 * count):
+            try:
+                result = self._attempt(programs, attempt, None)
+            except UngraspableError:
+                return
             if result.feasible:
                 found += 1
                 yield result
@@ -96,35 +94,37 @@ class CoarseBound:
                 return
 
     def _search(self, skeleton: Skeleton, known: Array | None) -> CoarseSolution:
-        try:
-            formulation = Formulator(self._geometry, Margins()).build(skeleton)
-        except UngraspableError as error:
-            excess = error.width - GRASPABLE
-            failure = Failure(error.action, f"width of {error.box}", excess, "both sides")
-            return CoarseSolution(skeleton, feasible=False, failure=failure, tries=0)
-        closest: tuple[float, Failure | None] = (np.inf, None)
+        """Start after start until one leads to a verified solution."""
+        programs = _Programs(self._geometry, skeleton)
+        closest: Failure | None = None
         for attempt in range(self._tries):
-            generator = _generator(skeleton, attempt)
-            start = self._starts.draw(
-                formulation,
-                generator,
-                noise=0.0 if attempt == 0 else _NOISE,
-                known=known if attempt in (0, 2) else None,
-            )
-            solution = self._solver.solve(formulation.program, start, self._settings)
-            result = self._check(skeleton, formulation, solution, attempt + 1)
+            try:
+                result = self._attempt(programs, attempt, known)
+            except UngraspableError as error:
+                failure = Failure(
+                    error.action, f"width of {error.box}", error.width - GRASPABLE, "both sides"
+                )
+                return CoarseSolution(skeleton, feasible=False, failure=failure, tries=0)
             if result.feasible:
                 return result
-            if solution.violation < closest[0]:
-                closest = (solution.violation, result.failure)
-        assert closest[1] is not None
-        failure = Failure(
-            closest[1].action,
-            closest[1].constraint,
-            closest[1].violation,
-            f"{self._tries} starts of the coarse bound",
-        )
+            assert result.failure is not None
+            if closest is None or result.failure.violation < closest.violation:
+                closest = result.failure
+        assert closest is not None
+        failure = replace(closest, tried=f"{self._tries} starts of the coarse bound")
         return CoarseSolution(skeleton, feasible=False, failure=failure, tries=self._tries)
+
+    def _attempt(self, programs: "_Programs", attempt: int, known: Array | None) -> CoarseSolution:
+        """One start: the first continues the solution of the prefix, the others are drawn."""
+        formulation = programs[attempt]
+        start = self._starts.draw(
+            formulation,
+            _generator(programs.skeleton, attempt),
+            noise=0.0 if attempt == 0 else _NOISE,
+            known=known if attempt in _CONTINUING else None,
+        )
+        solution = self._solver.solve(formulation.program, start, self._settings)
+        return self._check(programs.skeleton, formulation, solution, attempt + 1)
 
     def _check(
         self, skeleton: Skeleton, formulation: Formulation, solution: Solution, tries: int
@@ -133,12 +133,8 @@ class CoarseBound:
         if not solution.converged(self._settings):
             failure = _worst(formulation, solution)
             return CoarseSolution(skeleton, feasible=False, failure=failure, tries=tries)
-        contacts = tuple(
-            self._keyframe(formulation, s, solution.values) for s in formulation.contacts
-        )
-        retreated = tuple(
-            self._keyframe(formulation, s, solution.values) for s in formulation.retreated
-        )
+        contacts = self._keyframes(formulation, formulation.contacts, solution.values)
+        retreated = self._keyframes(formulation, formulation.retreated, solution.values)
         found = verify_keyframes(self._world, skeleton, contacts, retreated)
         if found is not None:
             failure = Failure(found.action, found.constraint, found.amount, "verification")
@@ -152,21 +148,54 @@ class CoarseBound:
             values=solution.values[: formulation.program.variables],
         )
 
-    def _keyframe(self, formulation: Formulation, snapshot: Snapshot, values: Array) -> Keyframe:
-        """Arms and boxes in the world at a snapshot of the program."""
-        q = pr2.HOME_CONFIGURATION.copy()
-        for gripper, joints in snapshot.joints.items():
-            if joints is not None:
-                arm = values[list(joints)]
-                q[pr2.arm_slice(gripper)] = arm if SIDES[gripper] > 0 else pr2.MIRROR * arm
-        boxes = {}
-        for name, where in snapshot.boxes.items():
-            if isinstance(where, Mode):
-                boxes[name] = compose(self._tools[where.gripper], _in_tool(where, values))
-            else:
-                x, y, yaw, z = formulation.level(values, where)
-                boxes[name] = compose(self._geometry.base, pose((x, y, z), yaw))
-        return Keyframe(q, boxes)
+    def _keyframes(
+        self, formulation: Formulation, snapshots: Iterable[Snapshot], values: Array
+    ) -> tuple[Keyframe, ...]:
+        """Arms and boxes in the world at snapshots of the program."""
+        poses: dict[int, Array] = {}
+        frames = []
+        for snapshot in snapshots:
+            q = pr2.HOME_CONFIGURATION.copy()
+            for gripper, joints in snapshot.joints.items():
+                if joints is not None:
+                    arm = values[list(joints)]
+                    q[pr2.arm_slice(gripper)] = arm if SIDES[gripper] > 0 else pr2.MIRROR * arm
+            boxes = {}
+            for name, where in snapshot.boxes.items():
+                if id(where) not in poses:  # most boxes stand where they stood before
+                    poses[id(where)] = self._box_pose(formulation, where, values)
+                boxes[name] = poses[id(where)]
+            frames.append(Keyframe(q, boxes))
+        return tuple(frames)
+
+    def _box_pose(self, formulation: Formulation, where: Level | Mode, values: Array) -> Array:
+        if isinstance(where, Mode):
+            return compose(self._tools[where.gripper], _in_tool(where, values))
+        x, y, yaw, z = formulation.level(values, where)
+        return self._geometry.in_world(x, y, yaw, z)
+
+
+_MARGINS = (Margins(), Margins(clear=-0.002, beside=0.002))
+"""Comfortable ones, and close ones that only the verification limits; starts take turns."""
+
+_CONTINUING = (0, 2)
+"""Starts that keep the solution of the prefix."""
+
+
+class _Programs:
+    """The programs of a skeleton, one per set of margins, built when a start needs them."""
+
+    def __init__(self, geometry: SceneGeometry, skeleton: Skeleton) -> None:
+        self.skeleton = skeleton
+        self._geometry = geometry
+        self._built: dict[int, Formulation] = {}
+
+    def __getitem__(self, attempt: int) -> Formulation:
+        """The program that a start solves."""
+        index = attempt % len(_MARGINS)
+        if index not in self._built:
+            self._built[index] = Formulator(self._geometry, _MARGINS[index]).build(self.skeleton)
+        return self._built[index]
 
 
 _NOISE = 0.3

@@ -7,6 +7,7 @@ level, lifted in place (if the box carried something when it was grasped) or whe
 (if something was placed on it since), and its joints are variables of the program too.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
@@ -200,8 +201,7 @@ class SceneGeometry:
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
-        self.base = pr2.base_pose(scene)
-        to_robot = inverse(self.base)
+        to_robot = inverse(pr2.base_pose(scene))
         self._turn = float(yaw_of(to_robot))
         self._shift = to_robot[:3]
         self.bodies: dict[str, Body] = {}
@@ -232,6 +232,14 @@ class SceneGeometry:
             yaw + self._turn,
             z + raised,
         )
+
+    def in_world(self, x: float, y: float, yaw: float, z: float) -> Array:
+        """Pose (7,) in the world of a level body in the robot's frame."""
+        base_x, base_y, base_yaw = self.scene.robot.base
+        cosine, sine = math.cos(base_yaw), math.sin(base_yaw)
+        half = (yaw + base_yaw) / 2
+        position = (base_x + cosine * x - sine * y, base_y + sine * x + cosine * y, z)
+        return np.array([*position, 0.0, 0.0, math.sin(half), math.cos(half)])
 
     def grasp_side(self, name: str) -> tuple[float, float, float]:
         """How the fingers close on a box: turn of its length against x, half length, width."""

@@ -31,21 +31,24 @@ class Sphere:
 
 
 SPHERES: tuple[Sphere, ...] = (
+    Sphere("l_upper_arm_link", (0.2, 0.0, 0.0), 0.08),
     Sphere("l_elbow_flex_link", (0.0, 0.0, 0.0), 0.085),
     Sphere("l_forearm_link", (0.15, 0.0, 0.0), 0.075),
     Sphere("l_forearm_link", (0.24, 0.0, -0.005), 0.062),
-    Sphere("l_forearm_link", (0.325, 0.025, -0.005), 0.045),
-    Sphere("l_forearm_link", (0.325, -0.025, -0.005), 0.045),
-    Sphere("l_gripper_palm_link", (0.085, 0.025, 0.0), 0.035),
-    Sphere("l_gripper_palm_link", (0.085, -0.025, 0.0), 0.035),
-    Sphere("l_gripper_palm_link", (0.132, 0.068, 0.0), 0.026),
-    Sphere("l_gripper_palm_link", (0.132, -0.068, 0.0), 0.026),
+    Sphere("l_forearm_link", (0.325, 0.025, -0.005), 0.047),
+    Sphere("l_forearm_link", (0.325, -0.025, -0.005), 0.047),
+    Sphere("l_gripper_palm_link", (0.085, 0.025, 0.0), 0.036),
+    Sphere("l_gripper_palm_link", (0.085, -0.025, 0.0), 0.036),
+    Sphere("l_gripper_palm_link", (0.105, 0.058, 0.0), 0.034),
+    Sphere("l_gripper_palm_link", (0.105, -0.058, 0.0), 0.034),
+    Sphere("l_gripper_palm_link", (0.137, 0.068, 0.0), 0.027),
+    Sphere("l_gripper_palm_link", (0.137, -0.068, 0.0), 0.027),
     Sphere("l_gripper_palm_link", (0.168, 0.065, 0.0), 0.018),
     Sphere("l_gripper_palm_link", (0.168, -0.065, 0.0), 0.018),
 )
-"""Elbow, forearm, wrist, palm and the two open fingers."""
+"""Upper arm, elbow, forearm, wrist, palm and the two open fingers."""
 
-COARSE_SPHERES: tuple[int, ...] = (0, 1, 2, 5, 6, 9, 10)
+COARSE_SPHERES: tuple[int, ...] = (0, 1, 2, 3, 4, 5, 6, 7, 12, 13)
 """The spheres that stand for an arm against the other arm."""
 
 
