@@ -7,9 +7,11 @@ from typing import Any
 import pandas as pd
 
 from guided_lgp.logic import Goal, State, parse_skeleton, progress
-from guided_lgp.scene import Scene
+from guided_lgp.scene import GRIPPERS, Scene
 
 BOX, HELD_BOX = "box", "held box"
+_BETWEEN = ("collision", "support")
+"""Constraints of which the kinds of the two bodies matter."""
 
 
 def objective_kind(objective: str, boxes: Collection[str]) -> str:
@@ -100,9 +102,17 @@ def failures(verdicts: pd.DataFrame, scenes: Mapping[str, Scene]) -> pd.DataFram
 
 
 def constraint_kind(constraint: str, scene: Scene) -> str:
-    """A constraint without names, such as ``collision robot–table`` for one between two bodies."""
+    """A constraint without names of bodies.
+
+    ``collision l_forearm_link tab2`` becomes ``collision robot–table``, ``reach pr2L red`` becomes
+    ``reach``.
+    """
     kinds = {table.name: "table" for table in scene.tables} | {b.name: "box" for b in scene.boxes}
-    words = constraint.split()
-    bodies = [kinds.get(word) or ("robot" if "_link" in word else None) for word in words]
-    plain = [word for word, body in zip(words, bodies, strict=True) if body is None]
-    return " ".join([*plain, "–".join(sorted(filter(None, bodies)))]).strip()
+    kinds |= dict.fromkeys(GRIPPERS, "robot")
+    words = [word for word in constraint.split() if word != "of"]
+    bodies = [kinds.get(word, "robot" if "_" in word else "") for word in words]
+    kind = " ".join(word for word, body in zip(words, bodies, strict=True) if not body)
+    named = [body for body in bodies if body]
+    if kind in _BETWEEN:
+        return f"{kind} {'–'.join(sorted(named))}"
+    return kind

@@ -1,0 +1,89 @@
+import pandas as pd
+import pytest
+
+from guided_lgp.report import analysis
+from guided_lgp.scene import Box, Scene, Table
+
+SCENE = Scene(
+    name="s",
+    tables=(
+        Table(name="tab1", position=(0.54, 0.33, 0.6), half_extents=(0.17, 0.2)),
+        Table(name="tab2", position=(0.54, -0.33, 0.6), half_extents=(0.17, 0.2)),
+    ),
+    boxes=(
+        Box(name="red", size=(0.15, 0.07, 0.1), position=(0.5, 0.3, 0.65), on="tab1"),
+        Box(name="green", size=(0.15, 0.07, 0.1), position=(0.5, 0.45, 0.65), on="tab1"),
+    ),
+)
+
+
+@pytest.mark.parametrize(
+    ("constraint", "kind"),
+    [
+        ("collision l_forearm_link tab2", "collision robot–table"),
+        ("collision red r_gripper_palm_link", "collision box–robot"),
+        ("support red tab1", "support box–table"),
+        ("reach pr2L red", "reach"),
+        ("width of red", "width"),
+        ("joint limit l_elbow_flex_joint", "joint limit"),
+        ("no motion found", "no motion found"),
+    ],
+)
+def test_constraint_kinds_have_no_names(constraint: str, kind: str) -> None:
+    assert analysis.constraint_kind(constraint, SCENE) == kind
+
+
+def test_objective_kinds() -> None:
+    boxes = ("red", "green", "blue")
+    assert analysis.objective_kind("(held red)", boxes) == "held"
+    assert analysis.objective_kind("(on red tab1) (on green blue)", boxes) == "on box + on table"
+
+
+def test_last_actions_by_arm_and_table() -> None:
+    skeletons = {
+        "(grasp pr2L red)": True,
+        "(grasp pr2R red)": False,
+        "(grasp pr2L red) (place pr2L red tab2)": True,
+        "(grasp pr2L red) (place pr2L red green)": False,
+        "(grasp pr2L red) (grasp pr2R green)": True,
+        "(grasp pr2L red) (grasp pr2R green) (place pr2R green red)": False,
+    }
+    verdicts = pd.DataFrame(
+        [{"configuration": "s", "skeleton": s, "feasible": f} for s, f in skeletons.items()]
+    )
+    shares = analysis.by_last_action(verdicts, {"s": SCENE})
+    found = {
+        (row.instruction, row.gripper, row.table): (row.n, row.feasible)
+        for row in shares.itertuples()
+    }
+    assert found == {
+        ("grasp", "pr2L", "tab1"): (1, 1),
+        ("grasp", "pr2R", "tab1"): (2, 1),
+        ("place", "pr2L", "box"): (1, 0),
+        ("place", "pr2L", "tab2"): (1, 1),
+        ("place", "pr2R", "held box"): (1, 0),
+    }
+
+
+def test_failures_are_counted_by_constraint_and_action() -> None:
+    rows = [("reach pr2L red", 0), ("reach pr2R red", 2), ("overlap red green", 2)]
+    verdicts = pd.DataFrame(
+        [
+            {
+                "configuration": "s",
+                "feasible": False,
+                "failure_constraint": constraint,
+                "failure_action": action,
+            }
+            for constraint, action in rows
+        ]
+    )
+    counts = analysis.failures(verdicts, {"s": SCENE})
+    assert list(counts.index) == ["reach", "overlap"]
+    assert counts.loc["reach"].to_dict() == {1: 1, 3: 1}
+
+
+def test_without_failures_the_table_is_empty() -> None:
+    columns = ["configuration", "failure_constraint", "failure_action"]
+    verdicts = pd.DataFrame([("s", None, None)], columns=columns).assign(feasible=True)
+    assert analysis.failures(verdicts, {"s": SCENE}).empty

@@ -1,0 +1,65 @@
+from typing import Any
+
+from guided_lgp.report import findings
+
+
+def cell(size: float | None, solved: int = 12) -> dict[str, Any]:
+    return {"problems": 12, "problems_solved": solved, "tree_size_mean": size}
+
+
+def times(total: float | None) -> dict[str, Any]:
+    return {"time_mean_s": total, "symbolic_s": total, "policy_s": 0.0, "coarse_s": 0.0}
+
+
+def sentences(sizes: dict[str, Any], seconds: dict[str, Any]) -> list[str]:
+    return findings.scalability({"c.1": sizes}, {"c.1": seconds})
+
+
+def test_a_rival_that_beats_guided_search_is_named_with_both_figures() -> None:
+    text = sentences(
+        {"guided": cell(99.0), "astar": cell(40.0), "breadth_first_graph": cell(5000.0)},
+        {"guided": times(0.5), "astar": times(2.0), "breadth_first_graph": times(0.4)},
+    )
+    assert "A* generates fewer nodes than guided search on c.1 (40.0 against 99.0)." in text
+    assert (
+        "Graph breadth-first needs less time than guided search on c.1 (0.40 s against 0.50 s)."
+        in text
+    )
+
+
+def test_without_such_a_rival_the_text_says_so() -> None:
+    text = sentences(
+        {"guided": cell(99.0), "astar": cell(400.0)}, {"guided": times(0.5), "astar": times(2.0)}
+    )
+    assert sum("No rival" in sentence for sentence in text) == 2
+
+
+def test_a_rival_that_leaves_problems_unsolved_does_not_win() -> None:
+    text = sentences(
+        {"guided": cell(99.0), "astar": cell(40.0, solved=11)},
+        {"guided": times(0.5), "astar": times(0.1)},
+    )
+    assert not any(sentence.startswith("A*") for sentence in text)
+
+
+def test_problems_without_a_plan_are_counted() -> None:
+    text = sentences(
+        {"guided": cell(99.0, solved=10), "guided_best_first": cell(99.0)},
+        {"guided": times(0.5), "guided_best_first": times(0.5)},
+    )
+    assert "Left without a plan: Guided 2 of 12 on c.1." in text
+
+
+def test_breadth_first_is_compared_or_said_to_have_met_the_limit() -> None:
+    guided = {"guided": cell(100.0)}
+    text = sentences(
+        guided | {"breadth_first": cell(200_000.0)},
+        {"guided": times(0.5), "breadth_first": times(50.0)},
+    )
+    assert "The breadth-first tree is larger than the guided one by 2,000× on c.1." in text
+    assert any("faster than breadth-first by 100.0× on c.1" in sentence for sentence in text)
+    text = sentences(
+        guided | {"breadth_first": cell(None, solved=3)},
+        {"guided": times(0.5), "breadth_first": times(None)},
+    )
+    assert "Breadth-first met the limit of the tree size on c.1 (3 of 12 solved)." in text
