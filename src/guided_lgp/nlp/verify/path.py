@@ -71,7 +71,7 @@ def verify_path(world: World, skeleton: Skeleton, trajectory: Trajectory) -> Pat
         skeleton: the actions that the motion carries out.
         trajectory: lists all arm and finger joints.
     """
-    switches = _switches(world.scene.state, skeleton, trajectory)
+    switches = switches_of(world.scene.state, skeleton, trajectory)
     if isinstance(switches, Violation):
         return PathReport(switches)
     columns = [trajectory.joint_names.index(name) for name in (*pr2.ARM_JOINTS, *_FINGERS)]
@@ -87,8 +87,12 @@ def verify_path(world: World, skeleton: Skeleton, trajectory: Trajectory) -> Pat
     return _walk(world, skeleton, switches, q, trajectory.times)
 
 
-def _switches(state: State, skeleton: Skeleton, trajectory: Trajectory) -> list[int] | Violation:
-    """Index into ``times`` of every action's switch, from the attachments."""
+def switches_of(state: State, skeleton: Skeleton, trajectory: Trajectory) -> list[int] | Violation:
+    """Index into ``times`` of every action's switch, from the attachments.
+
+    A violation instead, if the samples have an impossible shape or order, a joint is missing, or
+    the attachments are not those of the skeleton.
+    """
     rows = len(trajectory.times)
     if (
         trajectory.q.shape != (rows, len(trajectory.joint_names))
