@@ -19,7 +19,7 @@ import typer
 from typer.exceptions import TyperException
 
 from guided_lgp.errors import InputError, WorkerError
-from guided_lgp.paths import PARAMS
+from guided_lgp.paths import MODELS, PARAMS
 
 app = typer.Typer(
     name="guided-lgp",
@@ -48,6 +48,14 @@ class Network(StrEnum):
     INSTRUCTION = "instruction"
     GRASP = "grasp"
     PLACE = "place"
+
+
+class Planner(StrEnum):
+    """The planners that need nothing but a scene and, where guided, the trained policy."""
+
+    GUIDED = "guided"
+    BEST_FIRST = "best-first"
+    BREADTH_FIRST = "breadth-first"
 
 
 AsJson = Annotated[bool, typer.Option("--json", help="Write JSON to standard output.")]
@@ -81,6 +89,73 @@ def doctor(as_json: AsJson = False) -> None:
                 typer.echo(f"      {finding.mend}")
     if not all(finding.ok for finding in findings):
         raise typer.Exit(1)
+
+
+@app.command()
+def plan(
+    scene: Annotated[Path, typer.Argument(help="Scene to plan in, a JSON file.")],
+    goal: Annotated[
+        list[str],
+        typer.Option(
+            help='What must hold at the end: "(on BOX TABLE)" or "(held BOX)"; repeatable.'
+        ),
+    ],
+    planner: Annotated[Planner, typer.Option(help="How to search.")] = Planner.GUIDED,
+    html: Annotated[
+        Path | None, typer.Option(help="Write the motion as a 3D page for the browser.")
+    ] = None,
+    models: Annotated[Path, typer.Option(help="Folder with the trained policy.")] = MODELS,
+    as_json: AsJson = False,
+) -> None:
+    """Plan a sequence of actions and its motion; ends with 1 if no plan was found.
+
+    Example: guided-lgp plan examples/three_boxes.json --goal "(on red green)" --goal "(held blue)"
+    """
+    from guided_lgp.planning import plan as search
+    from guided_lgp.scene import load_scene
+
+    start = load_scene(scene)
+    result = search(start, goal, planner.value, models=models, where=str(scene))
+    times = {name: round(value, 3) for name, value in asdict(result.times).items()}
+    summary = {
+        "solved": result.solved,
+        "actions": [str(action) for action in result.skeleton or ()],
+        "explanation": result.explanation,
+        "tree_size": result.tree_size,
+        "time_s": times,
+    }
+    if as_json:
+        typer.echo(json.dumps(summary, indent=1))
+    if result.path is None or result.path.trajectory is None:
+        typer.echo(f"no plan: {result.explanation}", err=True)
+        raise typer.Exit(1)
+    if not as_json:
+        for number, action in enumerate(result.path.skeleton, 1):
+            typer.echo(f"{number:2d}  {action}")
+        duration = result.path.trajectory.times[-1]
+        typer.echo(f"motion of {duration:.1f} s, found in {sum(times.values()):.1f} s")
+    if html:
+        from guided_lgp.report.replay import replay_html
+
+        replay_html(result.path.trajectory, start, html)
+
+
+@app.command()
+def view(
+    scene: Annotated[Path, typer.Argument(help="Scene to show, a JSON file.")],
+    port: Annotated[int, typer.Option(help="TCP port on 127.0.0.1.", min=1, max=65535)] = 8080,
+) -> None:
+    """Show a scene in the browser, on this machine only, until interrupted.
+
+    Example: guided-lgp view examples/three_boxes.json
+    """
+    from guided_lgp.report.live import view as serve
+    from guided_lgp.scene import load_scene
+    from guided_lgp.scene.validate import validate_scene
+
+    shown = load_scene(scene)
+    validate_scene(shown, str(scene))
+    serve(shown, port=port, announce=lambda address: typer.echo(f"{address} (Ctrl-C ends it)"))
 
 
 @app.command("generate_scenes")
