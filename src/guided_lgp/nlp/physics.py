@@ -20,7 +20,7 @@ from guided_lgp.scene.bullet import pybullet
 from guided_lgp.scene.poses import compose, inverse
 from guided_lgp.scene.world import World, initial_poses
 
-RATE = 240
+RATE = 120
 """Simulation steps per second."""
 SETTLE_S = 1.0
 """How long (s) the world rests before the first motion and after the last."""
