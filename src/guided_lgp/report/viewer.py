@@ -84,15 +84,10 @@ class Viewer:
     def _add_surroundings(self) -> None:
         scene = self.server.scene
         scene.set_up_direction("+z")
-        # viser's default surroundings are a picture that the browser would fetch.
-        scene.configure_environment_map(None)
-        scene.add_light_hemisphere(
-            "/light", sky_color=(255, 255, 255), ground_color=(200, 200, 195), intensity=1.5
-        )
         scene.add_grid("/floor", 4.0, 4.0, cell_size=0.5, section_size=1.0)
         camera = self.server.initial_camera
-        camera.position = (2.1, -0.8, 1.75)
-        camera.look_at = (0.35, 0.0, 0.8)
+        camera.position = (2.2, -0.6, 1.7)
+        camera.look_at = (0.3, 0.0, 0.82)
         camera.fov = 0.75
 
     def _add_robot(self) -> None:
