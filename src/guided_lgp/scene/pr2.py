@@ -153,6 +153,9 @@ def grasp_axis(size: tuple[float, float, float]) -> int:
     return 0 if size[0] < size[1] else 1
 
 
+_STL_FACET = np.dtype([("normal", "<f4", 3), ("vertices", "<f4", (3, 3)), ("attribute", "<u2")])
+
+
 def arm_slice(gripper: str) -> slice:
     """Where the joints of the gripper's arm stand in a configuration q."""
     start = 7 * GRIPPERS.index(gripper)
@@ -181,9 +184,10 @@ def urdf_path() -> Path:
     """The PR2's URDF, ready for PyBullet and pinocchio.
 
     A copy in the user's cache folder (``$XDG_CACHE_HOME/guided-lgp``): the ``package://`` prefix
-    is replaced by the path of the installed meshes, and pure frames, which have no inertia, get
-    a mass of 1 g, where PyBullet would assume 1 kg. Written once, atomically, under a name that
-    depends on its content.
+    is replaced by the path of the installed meshes; pure frames, which have no inertia, get a
+    mass of 1 g, where PyBullet would assume 1 kg; and meshes without normals, which would be
+    drawn black, are drawn from repaired copies. Files are written once, atomically, under names
+    that depend on their content.
     """
     folder = description_folder()
     source = (folder / "urdf" / "pr2.urdf").read_text(encoding="utf-8")
@@ -195,9 +199,27 @@ def urdf_path() -> Path:
             ET.SubElement(inertial, "mass", value="0.001")
             moments = {"ixx": "1e-6", "iyy": "1e-6", "izz": "1e-6"}
             ET.SubElement(inertial, "inertia", moments | {"ixy": "0", "ixz": "0", "iyz": "0"})
-    content = ET.tostring(root)
+    for mesh in root.findall("link/visual/geometry/mesh"):
+        mesh.set("filename", str(_with_normals(Path(mesh.get("filename", "")))))
+    return _cached("pr2", "urdf", ET.tostring(root))
+
+
+def _with_normals(mesh: Path) -> Path:
+    """The mesh, or a copy with its facets' normals filled in, if it is an STL without them."""
+    content = mesh.read_bytes()
+    facets = np.frombuffer(content, _STL_FACET, offset=84).copy()
+    if np.any(facets["normal"]):
+        return mesh
+    sides = np.diff(facets["vertices"].astype(float), axis=1)
+    normals = np.cross(sides[:, 0], sides[:, 1])
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    facets["normal"] = normals / np.maximum(lengths, 1e-12)
+    return _cached(mesh.stem, "stl", content[:84] + facets.tobytes())
+
+
+def _cached(name: str, suffix: str, content: bytes) -> Path:
     base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    target = Path(base) / "guided-lgp" / f"pr2-{sha256(content).hexdigest()[:16]}.urdf"
+    target = Path(base) / "guided-lgp" / f"{name}-{sha256(content).hexdigest()[:16]}.{suffix}"
     if not target.exists():
         target.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.NamedTemporaryFile(dir=target.parent, delete=False) as file:
