@@ -26,7 +26,7 @@ typedef struct {
 
 typedef struct {
     double penalty, growth, largest_penalty, damping, tolerance;
-    int steps, inner;
+    int steps, inner, patience;
 } settings;
 
 static void gather(const program *nlp, int i, const double *values, double *x)
@@ -200,8 +200,10 @@ int coarse_solve(const program *nlp, const settings *options, double *values, do
     skyline(nlp, first);
     memset(multiplier, 0, sizeof(double) * rows);
     residuals(nlp, values, c);
-    double worst = violation(nlp, c);
-    while (worst > options->tolerance && tried < options->steps) {
+    double worst = violation(nlp, c), best = worst;
+    int improved = 0; /* step of the last good gain on the violation */
+    while (worst > options->tolerance && tried < options->steps &&
+           tried - improved < options->patience) {
         double value = merit(nlp, values, c, multiplier, penalty);
         for (int inner = 0; inner < options->inner && tried < options->steps; inner++) {
             linearise(nlp, values, c, multiplier, penalty, g, H);
@@ -239,6 +241,10 @@ int coarse_solve(const program *nlp, const settings *options, double *values, do
                 }
             }
             worst = violation(nlp, c);
+            if (worst < 0.9 * best) {
+                best = worst;
+                improved = tried;
+            }
             if (worst <= options->tolerance || !accepted || gain < 1e-2 * value)
                 break;
         }

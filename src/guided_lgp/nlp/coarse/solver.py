@@ -66,8 +66,10 @@ class Settings:
     largest_penalty: float = 1e5
     damping: float = 0.1
     tolerance: float = 1e-3
-    steps: int = 100
-    inner: int = 6
+    steps: int = 200
+    inner: int = 2
+    patience: int = 25
+    """Steps without a gain of 10 % on the violation before giving up."""
 
 
 @dataclass(frozen=True)
@@ -129,6 +131,7 @@ class _CSettings(ctypes.Structure):
         ),
         ("steps", ctypes.c_int),
         ("inner", ctypes.c_int),
+        ("patience", ctypes.c_int),
     )
 
 
@@ -175,6 +178,7 @@ class Compiled:
             settings.tolerance,
             settings.steps,
             settings.inner,
+            settings.patience,
         )
         steps = self._solve(
             ctypes.addressof(header),
@@ -206,8 +210,13 @@ class Interpreter:
         penalty, damping, tried = settings.penalty, settings.damping, 0
         multiplier = np.zeros(program.rows)
         c = self._residuals(program, values)
-        worst = _violation(c, equality)
-        while worst > settings.tolerance and tried < settings.steps:
+        worst = best = _violation(c, equality)
+        improved = 0
+        while (
+            worst > settings.tolerance
+            and tried < settings.steps
+            and tried - improved < settings.patience
+        ):
             value = _merit(program, values, c, multiplier, penalty, equality)
             for _ in range(settings.inner):
                 if tried >= settings.steps:
@@ -234,6 +243,8 @@ class Interpreter:
                         if damping > 1e8:
                             break
                 worst = _violation(c, equality)
+                if worst < 0.9 * best:
+                    best, improved = worst, tried
                 if worst <= settings.tolerance or not accepted or gain < 1e-2 * value:
                     break
             damping = min(damping, 1e3)
