@@ -201,7 +201,7 @@ class World:
             lightAmbientCoeff=0.55,
             lightDiffuseCoeff=0.5,
             lightSpecularCoeff=0.05,
-            shadow=True,
+            shadow=False,
             renderer=pybullet.ER_TINY_RENDERER,
             physicsClientId=self.client,
         )
