@@ -163,7 +163,7 @@ def _comparison(quantity: str, metrics: Metrics, figures: Metrics) -> Table:
         (
             "Mean ± standard deviation over the problems solved. n: problems given to each "
             "planner, objectives × configurations (one in the paper). (k/n): k of n solved. "
-            f"{NONE}: stopped at the limit of the tree size on at least one problem. "
+            f"{NONE}: stopped at the limit of the tree size on at least one problem, or none solved. "
             "*: reduced branching factor for breadth-first, as in the paper.",
         ),
         tuple(groups),
@@ -315,7 +315,10 @@ def enumeration(lengths: Sequence[Metrics], rejected: Mapping[str, tuple[int, in
         (row["split"], str(row["length"]), f"{row['n']:,}", percent(row["infeasible_share"]))
         for row in lengths
     ]
-    counts = ", ".join(f"{name} {kept} ({out} rejected)" for name, (kept, out) in rejected.items())
+    counts = ", ".join(
+        f"{name.replace('_', ' ')} {kept} ({out} rejected)"
+        for name, (kept, out) in rejected.items()
+    )
     return Table(
         "enumeration",
         "Exhaustive enumeration: verdicts of the coarse bound",
