@@ -163,7 +163,8 @@ def _comparison(quantity: str, metrics: Metrics, figures: Metrics) -> Table:
         (
             "Mean ± standard deviation over the problems solved. n: problems given to each "
             "planner, objectives × configurations (one in the paper). (k/n): k of n solved. "
-            f"{NONE}: stopped at the limit of the tree size on at least one problem, or none solved. "
+            f"{NONE}: stopped at the limit of the tree size on at least one problem, or none "
+            "solved. "
             "*: reduced branching factor for breadth-first, as in the paper.",
         ),
         tuple(groups),
