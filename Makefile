@@ -28,7 +28,7 @@ repro: setup
 	guided-lgp mlflow sync
 
 test: lint
-	pytest -n auto
+	pytest -n auto --dist loadfile
 
 lint: setup
 	ruff format --check .

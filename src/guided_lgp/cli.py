@@ -8,7 +8,8 @@ import json
 import logging
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict
 from enum import StrEnum
 from importlib import import_module
@@ -104,6 +105,9 @@ def plan(
     html: Annotated[
         Path | None, typer.Option(help="Write the motion as a 3D page for the browser.")
     ] = None,
+    execute: Annotated[
+        bool, typer.Option("--execute", help="Carry the plan out under gravity in PyBullet.")
+    ] = False,
     models: Annotated[Path, typer.Option(help="Folder with the trained policy.")] = MODELS,
     as_json: AsJson = False,
 ) -> None:
@@ -111,11 +115,14 @@ def plan(
 
     Example: guided-lgp plan examples/three_boxes.json --goal "(on red green)" --goal "(held blue)"
     """
+    from guided_lgp.logic import parse_objective
     from guided_lgp.planning import plan as search
     from guided_lgp.scene import load_scene
 
     start = load_scene(scene)
-    result = search(start, goal, planner.value, models=models, where=str(scene))
+    objective = parse_objective(goal)
+    with _spinner("planning"):
+        result = search(start, objective, planner.value, models=models, where=str(scene))
     times = {name: round(value, 3) for name, value in asdict(result.times).items()}
     summary = {
         "solved": result.solved,
@@ -124,20 +131,35 @@ def plan(
         "tree_size": result.tree_size,
         "time_s": times,
     }
-    if as_json:
-        typer.echo(json.dumps(summary, indent=1))
-    if result.path is None or result.path.trajectory is None:
+    path = result.path
+    if path is None or path.trajectory is None:
+        if as_json:
+            typer.echo(json.dumps(summary, indent=1))
         typer.echo(f"no plan: {result.explanation}", err=True)
         raise typer.Exit(1)
-    if not as_json:
-        for number, action in enumerate(result.path.skeleton, 1):
-            typer.echo(f"{number:2d}  {action}")
-        duration = result.path.trajectory.times[-1]
-        typer.echo(f"motion of {duration:.1f} s, found in {sum(times.values()):.1f} s")
+    physics = None
+    if execute:
+        from guided_lgp.nlp.physics import execute as simulate
+
+        with _spinner("executing"):
+            physics = simulate(start, objective, path.skeleton, path.trajectory)
+        summary["physics"] = asdict(physics)
     if html:
         from guided_lgp.report.replay import replay_html
 
-        replay_html(result.path.trajectory, start, html)
+        with _spinner("writing the replay"):
+            replay_html(path.trajectory, start, html)
+    if as_json:
+        typer.echo(json.dumps(summary, indent=1))
+        return
+    for number, action in enumerate(path.skeleton, 1):
+        typer.echo(f"{number:2d}  {action}")
+    typer.echo(f"motion of {path.trajectory.times[-1]:.1f} s, found in {sum(times.values()):.1f} s")
+    if physics is not None:
+        outcome = (
+            "all goals hold" if physics.success else f"failed: {physics.fault or physics.goals}"
+        )
+        typer.echo(f"physics: {outcome}")
 
 
 @app.command()
@@ -266,6 +288,18 @@ def _run_stage(stage: str, params_file: Path, *arguments: str) -> None:
         module.run(params, Path.cwd(), *arguments)
 
 
+@contextmanager
+def _spinner(text: str) -> Iterator[None]:
+    """Show on a terminal that something is going on."""
+    if not sys.stderr.isatty():
+        yield
+        return
+    from rich.console import Console
+
+    with Console(stderr=True).status(text):
+        yield
+
+
 def stage_main(stage: str) -> None:
     """Entry point of the scripts in ``stages/``: run one stage as the command line does."""
     main([stage, *sys.argv[1:]])
@@ -296,3 +330,7 @@ def _fail(error: Exception, code: int, debug: bool) -> None:
     prefix = f"internal error: {type(error).__name__}: " if internal else "error: "
     typer.echo(prefix + " ".join(text.split()), err=True)
     sys.exit(code)
+
+
+if __name__ == "__main__":
+    main()

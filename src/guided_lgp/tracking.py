@@ -10,6 +10,7 @@ import json
 import logging
 import math
 import os
+import shutil
 import subprocess
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -17,6 +18,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from hashlib import md5, sha256
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
 
 import yaml
@@ -83,6 +85,7 @@ def prepare() -> Any:
     Returns:
         An ``mlflow.MlflowClient``.
     """
+    os.environ.setdefault("MLFLOW_ENABLE_ARTIFACTS_PROGRESS_BAR", "false")
     for noisy in ("alembic", "mlflow"):
         logging.getLogger(noisy).setLevel(logging.ERROR)
     import mlflow
@@ -171,6 +174,7 @@ class _Run:
             if file.suffix == ".json":
                 _log_metrics(self._client, self._id, _read_metrics(file))
             self._client.log_artifact(self._id, str(file), str(file.parent.relative_to("reports")))
+        self._log_models([path for path in outputs if path.suffix == ".safetensors"])
         read = [file for path in stage.dependencies for file in _files(Path(path))]
         for file in [*read, *reports]:
             if file.parts[0] == "reports" and file.suffix == ".json":
@@ -178,6 +182,20 @@ class _Run:
                 prefixed = {f"{file.stem}.{name}": values for name, values in scalars.items()}
                 _log_metrics(self._client, self._parent, prefixed)
         self._end("FINISHED")
+
+    def _log_models(self, weights: list[Path]) -> None:
+        if not weights:
+            return
+        import mlflow
+
+        from guided_lgp.mlflow_model import log_network
+
+        with mlflow.start_run(run_id=self._id, log_system_metrics=False):
+            for path in weights:
+                with TemporaryDirectory() as folder:
+                    for file in (path, path.with_suffix(".json")):
+                        shutil.copy(file, folder)
+                    log_network(Path(folder), path.stem)
 
     def fail(self, reason: str) -> None:
         """Record why the stage has no results."""

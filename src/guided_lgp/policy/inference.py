@@ -51,7 +51,10 @@ class HierarchicalPolicy:
             [self.encoding.encode_goals(slots), self.encoding.encode_state(slots, positions)]
         )
         instruction = _log_softmax(_forward(self._chains["instruction"][0], code[None]))[0]
-        joint = {name: self._joint(name, code) for name in INSTRUCTIONS}
+        joint = {
+            name: chain_log_probabilities(self._chains[name], code[None])[0]
+            for name in INSTRUCTIONS
+        }
         scores = np.full(len(actions), FLOOR)
         for row, action in enumerate(actions):
             classes = self.encoding.encode_action(slots, action)
@@ -59,20 +62,6 @@ class HierarchicalPolicy:
                 chosen = tuple(index for index in classes[1:] if index >= 0)
                 scores[row] = instruction[classes[0]] + joint[action.instruction][chosen]
         return scores
-
-    def _joint(self, network: str, code: FloatArray) -> NDArray[np.float32]:
-        """Log-probability of every choice of symbols, one axis per sub-policy of the chain."""
-        inputs = code[None]
-        log_p = np.zeros(1, dtype=np.float32)
-        shape = []
-        for layers in self._chains[network]:
-            conditional = _log_softmax(_forward(layers, inputs))
-            count, classes = conditional.shape
-            log_p = (log_p[:, None] + conditional).ravel()
-            decisions = np.tile(np.eye(classes, dtype=np.float32), (count, 1))
-            inputs = np.concatenate([np.repeat(inputs, classes, axis=0), decisions], axis=1)
-            shape.append(classes)
-        return log_p.reshape(shape)
 
 
 def load_policy(directory: Path) -> HierarchicalPolicy:
@@ -90,6 +79,28 @@ def load_policy(directory: Path) -> HierarchicalPolicy:
             "models of one run of the stage train_policy",
         )
     return HierarchicalPolicy(models)
+
+
+def chain_log_probabilities(chain: Sequence[Layers], inputs: FloatArray) -> FloatArray:
+    """Log-probability of every choice of symbols by a classifier chain.
+
+    Args:
+        chain: the layers of each sub-policy.
+        inputs: (n, inputs) encoded objectives and states.
+
+    Returns:
+        (n, c1, c2, ...): one axis of classes per sub-policy.
+    """
+    shape = [len(inputs)]
+    log_p = np.zeros((len(inputs), 1), dtype=np.float32)
+    for layers in chain:
+        conditional = _log_softmax(_forward(layers, inputs))
+        rows, classes = conditional.shape
+        log_p = log_p.reshape(-1, 1) + conditional
+        decisions = np.tile(np.eye(classes, dtype=np.float32), (rows, 1))
+        inputs = np.concatenate([np.repeat(inputs, classes, axis=0), decisions], axis=1)
+        shape.append(classes)
+    return log_p.reshape(shape)
 
 
 def _forward(layers: Layers, inputs: FloatArray) -> FloatArray:
