@@ -47,7 +47,8 @@ def test_problems_without_a_plan_are_counted() -> None:
         {"guided": cell(99.0, solved=10), "guided_best_first": cell(99.0)},
         {"guided": times(0.5), "guided_best_first": times(0.5)},
     )
-    assert "Left without a plan: Guided 2 of 12 on c.1." in text
+    assert "Guided leaves without a plan: 2 of 12 on c.1." in text
+    assert "Guided best-first solves every problem with a verified path." in text
 
 
 def test_breadth_first_is_compared_or_said_to_have_met_the_limit() -> None:

@@ -96,7 +96,7 @@ def scalability(metrics: Metrics, timing: Metrics, limit: int) -> Figure:
     handles: dict[str, Any] = {}
     for axis in axes.flat:
         axis.set_yscale("log")
-        handles |= dict(zip(*reversed(axis.get_legend_handles_labels()), strict=True))
+        handles = dict(zip(*reversed(axis.get_legend_handles_labels()), strict=True)) | handles
     labels = [f"{name}{origin}" for name in PLANNERS.values() for origin in ("", " (paper)")]
     shown = [label for label in labels if label in handles]
     figure.legend([handles[label] for label in shown], shown, loc="outside lower center", ncols=4)
@@ -129,10 +129,17 @@ def _against_k(
             axis.errorbar(
                 lengths, values, (lower, errors), elinewidth=0.7, capsize=1.5, label=name, **style
             )
-        if limit is not None:
-            stopped = [k for k, cell in cells if cell and cell[mean] is None]
+        stopped = [k for k, cell in cells if cell and cell[mean] is None]
+        # Guided search ends with its attempts, not at the limit.
+        if limit is not None and stopped and planner != "guided":
             axis.plot(
-                stopped, [limit] * len(stopped), "x", color=style["color"], markersize=6, zorder=3
+                stopped,
+                [limit] * len(stopped),
+                "x",
+                color=style["color"],
+                markersize=6,
+                zorder=3,
+                label=None if known else name,
             )
         printed = [
             (p.k_min + shift, paper.SCALABILITY[p.name][planner][mean])
@@ -287,7 +294,8 @@ def failures(counts: pd.DataFrame) -> Figure:
     axis.invert_yaxis()
     axis.set_xlabel("Infeasible sequences")
     axis.grid(axis="y", visible=False)
-    axis.legend()
+    if not counts.empty:
+        figure.legend(loc="outside right upper")
     return figure
 
 

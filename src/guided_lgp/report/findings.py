@@ -37,7 +37,7 @@ def generalization(metrics: Metrics) -> list[str]:
 def scalability(metrics: Metrics, timing: Metrics) -> list[str]:
     """How guided search compares with breadth-first, and where a rival beats it."""
     sentences = list(_against_breadth_first(metrics, timing))
-    sentences += [_unsolved(metrics)]
+    sentences += _unsolved(metrics)
     for quantity, key, source, unit in (
         ("generates fewer nodes", "tree_size_mean", metrics, ""),
         ("needs less time", "time_mean_s", timing, " s"),
@@ -77,18 +77,19 @@ def _against_breadth_first(metrics: Metrics, timing: Metrics) -> Iterator[str]:
         yield f"Breadth-first met the limit of the tree size on {_join(limited)}."
 
 
-def _unsolved(metrics: Metrics) -> str:
-    missing = [
-        f"{PLANNERS[planner]} {cell['problems'] - cell['problems_solved']} of "
-        f"{cell['problems']} on {name}"
-        for name, cells in metrics.items()
-        for planner, cell in cells.items()
-        if planner in GUIDED and cell["problems_solved"] < cell["problems"]
-    ]
-    if missing:
-        return f"Left without a plan: {_join(missing)}."
-    guided = [PLANNERS[p] for p in GUIDED if any(p in cells for cells in metrics.values())]
-    return f"All problems are solved with a verified path by: {_join(guided)}."
+def _unsolved(metrics: Metrics) -> Iterator[str]:
+    """Per guided planner, the problems without a plan, if any."""
+    for planner in GUIDED:
+        cells = {name: row[planner] for name, row in metrics.items() if planner in row}
+        missing = [
+            f"{cell['problems'] - cell['problems_solved']} of {cell['problems']} on {name}"
+            for name, cell in cells.items()
+            if cell["problems_solved"] < cell["problems"]
+        ]
+        if missing:
+            yield f"{PLANNERS[planner]} leaves without a plan: {_join(missing)}."
+        elif cells:
+            yield f"{PLANNERS[planner]} solves every problem with a verified path."
 
 
 def _beaten(metrics: Metrics, source: Metrics, key: str, quantity: str, unit: str) -> Iterator[str]:

@@ -18,7 +18,7 @@ from guided_lgp.report.contents import compose
 from guided_lgp.report.inputs import Inputs, Metrics, load_inputs
 from guided_lgp.report.pictures import draw_scene
 from guided_lgp.report.replay import replay_html
-from guided_lgp.report.style import NETWORKS
+from guided_lgp.report.style import NETWORKS, PLANNERS
 from guided_lgp.report.table import Table
 
 SETUPS = "abcd"
@@ -104,15 +104,20 @@ def _figures(inputs: Inputs, params: Params) -> Mapping[str, Figure]:
 
 
 def _replays(inputs: Inputs, bounds: BoundsParams, reports: Path) -> list[tuple[str, str]]:
-    """Write a replay per setup, of guided search's last plan; returns (address, description)."""
+    """Write a replay of one plan per setup: guided search's last, or else another planner's.
+
+    Returns:
+        Address relative to the report and description of each.
+    """
     written = []
-    solved = inputs.runs[inputs.runs["solved"] & (inputs.runs["planner"] == "guided")]
+    solved = inputs.runs[inputs.runs["solved"].astype(bool)]
+    solved = solved.sort_values("planner", key=lambda names: names == "guided", kind="stable")
     for setup in SETUPS:
         plans = solved[solved["problem"].str.startswith(setup)]
         if plans.empty:
             continue
-        problem, configuration, objective, skeleton = plans.iloc[-1][
-            ["problem", "configuration", "objective", "skeleton"]
+        problem, configuration, objective, planner, skeleton = plans.iloc[-1][
+            ["problem", "configuration", "objective", "planner", "skeleton"]
         ]
         scenes = inputs.scenes[f"scalability_{setup}"].scenes
         scene = next(scene for scene in scenes if scene.name == configuration)
@@ -122,5 +127,6 @@ def _replays(inputs: Inputs, bounds: BoundsParams, reports: Path) -> list[tuple[
         if trajectory is not None:
             address = f"replays/{setup}.html"
             replay_html(trajectory, scene, reports / address)
-            written.append((address, f"Problem {problem}: {objective}, {len(actions)} actions"))
+            plan = f"{len(actions)} actions by {PLANNERS[planner]}"
+            written.append((address, f"Problem {problem}: {objective}, {plan}"))
     return written
