@@ -77,3 +77,19 @@ def test_same_search_twice(scene: Scene, limits: SearchLimits) -> None:
     )
     assert (first.skeleton, first.tree_size) == (second.skeleton, second.tree_size)
     assert (first.expansions, first.coarse_calls) == (second.expansions, second.coarse_calls)
+
+
+def test_a_policy_that_goes_in_circles(scene: Scene) -> None:
+    """It loves to move green to and fro; the search still turns to red soon."""
+    circles = Scorer(lambda objective, state, action: 6.0 * (action.box == "green"))
+    limits = SearchLimits(max_depth=20, reattempts=0, max_tree_size=400_000)
+    result = best_first.plan(
+        scene,
+        parse_objective(["(on red tab2)"]),
+        scene.symbols,
+        ScriptedBounds(scene),
+        circles,
+        limits,
+    )
+    assert result.solved
+    assert result.tree_size < 500
