@@ -1,6 +1,7 @@
 """The coarse bound P_coarse of a skeleton (paper, eq. 3): starts, solver, verification."""
 
 import time
+import weakref
 import zlib
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
@@ -55,6 +56,7 @@ class CoarseBound:
         self._starts = Starts(self._geometry, self._solver)
         self._settings = Settings()
         self._world = World(scene)
+        weakref.finalize(self, self._world.close)
         self._tools = {
             gripper: pr2.tool_pose(scene, pr2.HOME_CONFIGURATION, gripper) for gripper in GRIPPERS
         }

@@ -8,6 +8,7 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from hashlib import sha256
+from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -59,7 +60,7 @@ def _digest() -> str:
     """A name for all that the library depends on; cheaper than to generate the code."""
     folder = Path(__file__).parent
     sources = [folder / name for name in ("kinematics.py", "kernels.py", "compiler.py", "solver.c")]
-    content = sha256("\n".join((ca.__version__, sys.platform, *_FLAGS)).encode())
+    content = sha256("\n".join((version("casadi"), sys.platform, *_FLAGS)).encode())
     for source in (*sources, pr2.urdf_path()):
         content.update(source.read_bytes())
     return content.hexdigest()[:16]

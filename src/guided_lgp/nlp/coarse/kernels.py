@@ -41,9 +41,11 @@ class Kernel:
     rows: int
     residual: Any
     jacobian: Any
+    independent: Any
+    """Like ``residual``, with no more rows than independent constraints, for other solvers."""
 
 
-def _kernel(name: str, equality: bool, x: Any, p: Any, c: Any) -> Kernel:
+def _kernel(name: str, equality: bool, x: Any, p: Any, c: Any, independent: Any = None) -> Kernel:
     jacobian = ca.densify(ca.jacobian(c, x))
     return Kernel(
         name=name,
@@ -54,6 +56,9 @@ def _kernel(name: str, equality: bool, x: Any, p: Any, c: Any) -> Kernel:
         residual=ca.Function(f"{name}_residual", [x, p], [ca.densify(c)]),
         # transposed: CasADi stores columns, the solver reads rows
         jacobian=ca.Function(f"{name}_jacobian", [x, p], [ca.densify(c), jacobian.T]),
+        independent=ca.Function(
+            f"{name}_independent", [x, p], [c if independent is None else independent]
+        ),
     )
 
 
@@ -115,7 +120,12 @@ def _hold() -> Kernel:
         arm.rotation[2, 0] - rotation[2, 0],
         arm.rotation[2, 2] - rotation[2, 2],
     )
-    return _kernel("hold", True, x, p, c)
+    twist = ca.mtimes(rotation.T, arm.rotation)
+    # Rodrigues' vector of the rotation between the two: axis times tan(angle / 2)
+    rodrigues = ca.vertcat(
+        twist[2, 1] - twist[1, 2], twist[0, 2] - twist[2, 0], twist[1, 0] - twist[0, 1]
+    ) / (1 + ca.trace(twist))
+    return _kernel("hold", True, x, p, c, ca.vertcat(c[:3], rodrigues))
 
 
 def _pads() -> Kernel:

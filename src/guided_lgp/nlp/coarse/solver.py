@@ -209,7 +209,7 @@ class Interpreter:
         )
         penalty, damping, tried = settings.penalty, settings.damping, 0
         multiplier = np.zeros(program.rows)
-        c = self._residuals(program, values)
+        c = self.residuals(program, values)
         worst = best = _violation(c, equality)
         improved = 0
         while (
@@ -232,7 +232,7 @@ class Interpreter:
                     damped = H[np.ix_(free, free)] + damping * np.eye(int(free.sum()))
                     direction[free] = np.linalg.solve(damped, -g[free])
                     values[:n] = np.clip(x + direction, program.lower, program.upper)
-                    c_new = self._residuals(program, values)
+                    c_new = self.residuals(program, values)
                     trial = _merit(program, values, c_new, multiplier, penalty, equality)
                     if trial < value:
                         accepted, gain, value, c = True, value - trial, trial, c_new
@@ -264,7 +264,8 @@ class Interpreter:
         parameters = program.parameters[program.parameter_start[i] :][: kernel.parameters]
         return kernel, values[inputs], parameters
 
-    def _residuals(self, program: Program, values: Array) -> Array:
+    def residuals(self, program: Program, values: Array) -> Array:
+        """All rows (scaled) at values of the variables and constants."""
         parts = []
         for i in range(program.instances):
             kernel, x, p = self._arguments(program, i, values)

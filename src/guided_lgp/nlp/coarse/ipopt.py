@@ -1,0 +1,66 @@
+"""The same programs for IPOPT, an independent solver: the oracle of tests and benchmark."""
+
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from guided_lgp.nlp.coarse.kernels import kernels
+from guided_lgp.nlp.coarse.solver import Interpreter, Program, Settings, Solution
+from guided_lgp.nlp.results import Array
+
+
+class Ipopt:
+    """One program in IPOPT (interior point, exact Hessian, CasADi SX).
+
+    Building it takes far longer than solving it: nothing is shared between programs.
+    """
+
+    def __init__(self, program: Program, values: Array, settings: Settings) -> None:
+        """Set up a program; ``values`` gives the constants (variables first, then constants)."""
+        self._program = program
+        self._settings = settings
+        count = program.variables
+        self._constants = values[count:]
+        x = ca.SX.sym("x", count)
+        everything = ca.vertcat(x, ca.SX(self._constants))
+        rows, lower, upper = [], [], []
+        for i, number in enumerate(program.kernel):
+            kernel = kernels()[number]
+            inputs = program.inputs[program.input_start[i] :][: kernel.inputs].tolist()
+            parameters = program.parameters[program.parameter_start[i] :][: kernel.parameters]
+            c = kernel.independent(everything[inputs], ca.SX(parameters))
+            rows.append(c)
+            lower += [0.0] * c.numel()
+            upper += [0.0 if kernel.equality else np.inf] * c.numel()
+        cost = 0.5 * ca.dot(ca.SX(program.weight), (x - ca.SX(program.target)) ** 2)
+        options: dict[str, Any] = {
+            "print_time": False,
+            "ipopt.print_level": 0,
+            "ipopt.sb": "yes",
+            "ipopt.tol": settings.tolerance,
+            "ipopt.constr_viol_tol": settings.tolerance,
+            "ipopt.max_iter": settings.steps,
+        }
+        self._lower, self._upper = lower, upper
+        self._solver = ca.nlpsol(
+            "oracle", "ipopt", {"x": x, "f": cost, "g": ca.vertcat(*rows)}, options
+        )
+
+    def solve(self, values: Array) -> Solution:
+        """Solve from a start: variables first, then constants."""
+        program = self._program
+        answer = self._solver(
+            x0=values[: program.variables],
+            lbx=program.lower,
+            ubx=program.upper,
+            lbg=self._lower,
+            ubg=self._upper,
+        )
+        everything = np.concatenate([np.array(answer["x"]).ravel(), self._constants])
+        c = Interpreter().residuals(program, everything)
+        equality = np.concatenate(
+            [np.full(kernels()[k].rows, kernels()[k].equality) for k in program.kernel]
+        )
+        worst = float(np.max(np.where(equality, np.abs(c), -c), initial=0.0))
+        return Solution(everything, c, worst, int(self._solver.stats()["iter_count"]))
