@@ -3,16 +3,21 @@
 import json
 import logging
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from guided_lgp import tracking
 from guided_lgp.errors import InputError
+from guided_lgp.mlflow_model import log_network
 from guided_lgp.params import Params, load_params
+from guided_lgp.policy.encoding import CHAINS, Encoding
+from guided_lgp.policy.models import Model
 
 ROOT = Path(__file__).parents[1]
 PARAMS = load_params(ROOT / "params.yaml")
@@ -120,6 +125,42 @@ def test_metrics_curves_and_files_are_recorded(clone: Path) -> None:
     assert [(point.step, point.value) for point in curve] == [(0, 2.0), (1, 1.0), (2, 0.5)]
     files = [item.path for item in client.list_artifacts(child.info.run_id, "training")]
     assert files == ["training/place.json"]
+
+
+def test_networks_can_be_loaded_from_mlflow(
+    tmp_path: Path, database: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import mlflow
+
+    shutil.copy(database, tmp_path / "mlflow.db")
+    monkeypatch.setenv("MLFLOW_TRACKING_URI", f"sqlite:///{tmp_path / 'mlflow.db'}")
+    encoding = Encoding()
+    rng = np.random.default_rng(0)
+    sub_policies = {
+        name: ((rng.normal(size=(classes, inputs)).astype(np.float32), np.zeros(classes, "f4")),)
+        for name, inputs, classes in zip(
+            CHAINS["grasp"],
+            encoding.chain_inputs("grasp"),
+            map(encoding.classes, CHAINS["grasp"]),
+            strict=True,
+        )
+    }
+    Model("grasp", encoding, sub_policies, training={}).save(tmp_path / "models")
+    experiment = tracking.prepare().get_experiment_by_name(tracking.EXPERIMENT).experiment_id
+    with mlflow.start_run(experiment_id=experiment):
+        log_network(tmp_path / "models", "grasp")
+        (logged,) = mlflow.search_logged_models(
+            experiment_ids=[experiment], filter_string="name = 'grasp'", output_format="list"
+        )
+    model = mlflow.pyfunc.load_model(logged.model_uri)
+    assert model.metadata.signature is not None
+    assert model.input_example is not None
+    inputs = rng.normal(size=(4, encoding.chain_inputs("grasp")[0])).astype(np.float32)
+    probabilities = model.predict(inputs)
+    assert probabilities.shape == (4, 6)
+    np.testing.assert_allclose(probabilities.sum(axis=1), 1, rtol=1e-5)
+    with pytest.raises(mlflow.exceptions.MlflowException):
+        model.predict(inputs[:, :-1])
 
 
 def test_a_failing_stage_is_recorded_as_failed(clone: Path) -> None:
