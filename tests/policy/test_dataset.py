@@ -17,11 +17,13 @@ from guided_lgp.logic import (
     progress,
     satisfied,
     two_goal_objectives,
+    unsatisfied,
 )
 from guided_lgp.policy.dataset import Dataset, load_dataset
 from guided_lgp.policy.encoding import INSTRUCTIONS
 from guided_lgp.policy.samples import build_dataset
 from guided_lgp.policy.split import training_objectives
+from guided_lgp.policy.variants import VARIANTS
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +51,7 @@ def decode_action(classes: np.ndarray, symbols: Symbols) -> Action:
 
 
 def expected_samples(
-    world: Enumeration, objectives: list[Objective], slack: int
+    world: Enumeration, objectives: list[Objective], slack: int, adapt: bool = False
 ) -> set[tuple[Objective, bytes, Action]]:
     """The definition of the samples, one by one."""
     samples = set()
@@ -62,18 +64,17 @@ def expected_samples(
                 prefixes = [progress(scene.state, path[:k]) for k in range(len(path))]
                 if not satisfied(end, objective) or any(satisfied(s, objective) for s in prefixes):
                     continue
-                for frame, action in zip(positions_along(scene, path), path, strict=False):
+                frames = positions_along(scene, path)
+                for prefix, frame, action in zip(prefixes, frames, path, strict=False):
                     state = np.concatenate(list(frame.values())).astype(np.float32).tobytes()
-                    samples |= {(objective, state, action), (objective[::-1], state, action)}
+                    goals = unsatisfied(prefix, objective) if adapt else objective
+                    goals = goals * (2 // len(goals))  # one goal is encoded twice
+                    samples |= {(goals, state, action), (goals[::-1], state, action)}
     return samples
 
 
-@pytest.mark.parametrize("slack", [0, 1])
-def test_samples_are_those_of_the_definition(
-    world: Enumeration, objectives: list[Objective], slack: int
-) -> None:
-    dataset = build_dataset(world.scenes, world.sequences, world.shortest, objectives, slack)
-    found = {
+def found_samples(dataset: Dataset) -> set[tuple[Objective, bytes, Action]]:
+    return {
         (
             decode_goals(dataset.goals[goals], dataset.symbols),
             dataset.states[state].tobytes(),
@@ -81,7 +82,60 @@ def test_samples_are_those_of_the_definition(
         )
         for state, goals in zip(dataset.sample_state, dataset.sample_goals, strict=True)
     }
-    assert found == expected_samples(world, objectives, slack)
+
+
+@pytest.mark.parametrize("slack", [0, 1])
+def test_samples_are_those_of_the_definition(
+    world: Enumeration, objectives: list[Objective], slack: int
+) -> None:
+    dataset = build_dataset(world.scenes, world.sequences, world.shortest, objectives, slack)
+    assert found_samples(dataset) == expected_samples(world, objectives, slack)
+
+
+def build(world: Enumeration, objectives: list[Objective], variant: str) -> Dataset:
+    return build_dataset(
+        world.scenes, world.sequences, world.shortest, objectives, 0, VARIANTS[variant]
+    )
+
+
+def test_variant_with_unsatisfied_goals_only(
+    world: Enumeration, objectives: list[Objective], dataset: Dataset
+) -> None:
+    variant = build(world, objectives, "unsatisfied_goals")
+    assert found_samples(variant) == expected_samples(world, objectives, 0, adapt=True)
+    assert (variant.sample_state == dataset.sample_state).all()
+
+
+def test_variant_with_one_order(
+    world: Enumeration, objectives: list[Objective], dataset: Dataset
+) -> None:
+    variant = build(world, objectives, "one_order")
+    assert len(variant) == len(dataset) / 2
+    goals = variant.goals[variant.sample_goals]
+    assert {decode_goals(code, variant.symbols) for code in goals} <= set(objectives)
+
+
+def test_variant_with_normalised_positions(
+    world: Enumeration, objectives: list[Objective], dataset: Dataset
+) -> None:
+    variant = build(world, objectives, "normalised")
+    moving = np.ptp(dataset.states, axis=0) > 0
+    assert np.abs(variant.states.mean(axis=0)).max() < 1e-4
+    assert np.abs(variant.states.std(axis=0) - moving).max() < 1e-3
+    scene = world.scenes[0]
+    slots = variant.encoding.fill((), scene.state, scene.symbols)
+    start = variant.encoding.encode_state(slots, positions_along(scene, ())[0])
+    assert (variant.states == start).all(axis=1).any()
+
+
+def test_variant_without_chain(
+    world: Enumeration, objectives: list[Objective], dataset: Dataset
+) -> None:
+    variant = build(world, objectives, "no_chain")
+    samples = variant.of_network("place")
+    inputs, classes = variant.tensors("place", "table", samples)
+    assert inputs.shape == (len(samples), 41)
+    assert (classes == dataset.tensors("place", "table", samples)[1]).all()
 
 
 def test_each_step_is_a_sample_once_per_order_of_the_goals(

@@ -125,14 +125,37 @@ def test_slots_without_a_symbol_are_empty_and_zero() -> None:
     assert code.tolist() == [[float(name is not None)] * 3 for name in slots.symbols]
 
 
+def test_normalised_positions_by_hand() -> None:
+    symbols = Symbols(("pr2L", "pr2R"), ("red", "green"), ("tab1", "tab2"))
+    encoding = Encoding(centre=(0.5, 0.0, 1.0) * 7, scale=(2.0, 1.0, 0.5) * 7)
+    slots = encoding.fill((), State.of({"red": "tab1", "green": "tab1"}), symbols)
+    positions = {name: np.array([2.5, 1.0, 0.0]) for name in slots.symbols if name}
+    code = encoding.encode_state(slots, positions).reshape(7, 3)
+    assert code[[0, 1, 2, 3, 5, 6]].tolist() == [[1, 1, -2]] * 6
+    assert code[4].tolist() == [0, 0, 0]
+
+
+def test_without_chain_every_sub_policy_has_the_input_alone() -> None:
+    assert Encoding(chain=False).chain_inputs("place") == [41, 41, 41]
+
+
 def test_document_comes_back() -> None:
-    for encoding in (ENCODING, Encoding(boxes=5)):
+    normalised = Encoding(centre=(0.1,) * 21, scale=(0.7,) * 21)
+    for encoding in (ENCODING, Encoding(boxes=5), Encoding(chain=False), normalised):
         assert Encoding.parse(encoding.document(), "x.json", "train_policy") == encoding
 
 
 @pytest.mark.parametrize(
     "change",
-    [{"version": 0}, {"slots": {"boxes": 4}}, {"slots": {"legs": 2}}, {"inputs": []}, {"slots": 3}],
+    [
+        {"version": 0},
+        {"slots": {"boxes": 4}},
+        {"slots": {"legs": 2}},
+        {"slots": 3},
+        {"inputs": []},
+        {"normalisation": {"centre": [0.1], "scale": [0.7]}},
+        {"normalisation": {"centre": [], "scale": [0.7] * 21}},
+    ],
 )
 def test_documents_of_another_encoding_are_refused(change: dict[str, object]) -> None:
     with pytest.raises(InputError, match=r"x\.json: encoding.*train_policy"):

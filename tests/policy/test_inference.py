@@ -139,6 +139,17 @@ def test_saved_twice_the_bytes_are_equal(models: Path, tmp_path: Path) -> None:
         assert (tmp_path / "again" / name).read_bytes() == (models / name).read_bytes()
 
 
+def test_without_chain_the_choices_are_independent(tmp_path: Path, situation: Situation) -> None:
+    save(tmp_path, Encoding(chain=False))
+    p = np.exp(load_policy(tmp_path).log_probabilities(*situation, ACTIONS))
+    assert p.sum() == pytest.approx(1, abs=1e-6)
+    place = p[6:].reshape(2, 3, 5)
+    independent = np.einsum(
+        "i,j,k", place.sum((1, 2)), place.sum((0, 2)), place.sum((0, 1)), optimize=True
+    )
+    np.testing.assert_allclose(place, independent / place.sum() ** 2, atol=1e-6)
+
+
 @pytest.mark.parametrize("name", ["place.json", "place.safetensors"])
 @pytest.mark.parametrize("damage", [None, b"", b"{}", b"[1]", b"\xff\x00"])
 def test_missing_and_damaged_files_name_the_stage(

@@ -40,7 +40,7 @@ class Dataset:
     configuration: NDArray[np.int16]
     """(M,) index of the configuration."""
     goals: FloatArray
-    """(G, goals · goal_size) the encoded objectives, each in every order of its goals."""
+    """(G, goals · goal_size) the encoded objectives, in both orders of their goals."""
     sample_state: NDArray[np.int32]
     """(N,) index of each sample's state."""
     sample_goals: NDArray[np.int32]
@@ -75,7 +75,8 @@ class Dataset:
             classes = self.actions[state, _COLUMNS.index(name)].astype(np.int64)
             if name == sub_policy:
                 return np.concatenate(blocks, axis=1), classes
-            blocks.append(np.eye(self.encoding.classes(name), dtype=np.float32)[classes])
+            if self.encoding.chain:
+                blocks.append(np.eye(self.encoding.classes(name), dtype=np.float32)[classes])
         raise KeyError(sub_policy)
 
     def class_names(self, sub_policy: str) -> tuple[str, ...]:

@@ -6,7 +6,7 @@ and actions into numbers once the slots are filled.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,8 @@ CHAINS: Mapping[str, tuple[str, ...]] = {
     "place": ("gripper", "box", "table"),
 }
 """The sub-policies of each network in the order of its classifier chain."""
+
+_SLOTS = ("grippers", "boxes", "surfaces", "goals")
 
 FloatArray = NDArray[np.float32]
 
@@ -53,17 +55,24 @@ class Slots:
 
 @dataclass(frozen=True)
 class Encoding:
-    """The numbers of slots, and the encoding that follows from them.
+    """The numbers of slots and the scaling of positions, and the encoding that follows from them.
 
     The input (g, s_k) is: per goal the one-hots of its type, box and table (zeros where a goal has
     no table), then the world x, y, z in m of every gripper, box and surface. With the default
     numbers of slots these are 2 · (2 + 3 + 5) + 7 · 3 = 41 numbers. An empty slot is zero.
+
+    The paper takes positions as they are. A variant that normalises them gives ``centre`` and
+    ``scale``, one number each per coordinate of the state: (position - centre) / scale.
     """
 
     grippers: int = 2
     boxes: int = 3
     surfaces: int = 2
     goals: int = 2
+    chain: bool = True
+    """Whether sub-policies see the decisions before them in the chain."""
+    centre: tuple[float, ...] = ()
+    scale: tuple[float, ...] = ()
 
     @property
     def goal_size(self) -> int:
@@ -109,7 +118,7 @@ class Encoding:
         """The input length of each sub-policy: the input, then the previous one-hots."""
         sizes = [self.input_size]
         for sub_policy in CHAINS[network][:-1]:
-            sizes.append(sizes[-1] + self.classes(sub_policy))
+            sizes.append(sizes[-1] + (self.classes(sub_policy) if self.chain else 0))
         return sizes
 
     def fill(self, objective: Objective, state: State, symbols: Symbols) -> Slots:
@@ -162,13 +171,20 @@ class Encoding:
             positions: world position (3,) in m of every symbol.
 
         Returns:
-            (state_size,) positions in m; zeros for an empty slot.
+            (state_size,) positions in m, or normalised; zeros for an empty slot.
         """
-        code = np.zeros((len(slots.symbols), 3), dtype=np.float32)
-        for row, name in enumerate(slots.symbols):
-            if name is not None:
-                code[row] = positions[name]
+        empty = [name is None for name in slots.symbols]
+        world = [np.zeros(3) if name is None else positions[name] for name in slots.symbols]
+        code = self.scaled(np.concatenate(world).astype(np.float32)).reshape(-1, 3)
+        code[empty] = 0
         return code.ravel()
+
+    def scaled(self, states: FloatArray) -> FloatArray:
+        """Normalise positions (..., state_size), if this encoding does."""
+        if not self.scale:
+            return states
+        centre, scale = (np.array(part, dtype=np.float32) for part in (self.centre, self.scale))
+        return (states - centre) / scale
 
     def encode_action(self, slots: Slots, action: Action) -> tuple[int, int, int, int] | None:
         """The classes of an action: instruction, gripper, box, table (-1 for a grasp).
@@ -189,7 +205,13 @@ class Encoding:
 
     def document(self) -> dict[str, Any]:
         """What is saved as JSON with the data set and the weights."""
-        return {"version": VERSION, "slots": asdict(self), "inputs": list(self.input_names)}
+        return {
+            "version": VERSION,
+            "slots": {name: getattr(self, name) for name in _SLOTS},
+            "chain": self.chain,
+            "normalisation": {"centre": list(self.centre), "scale": list(self.scale)},
+            "inputs": list(self.input_names),
+        }
 
     @classmethod
     def parse(cls, document: object, where: str, stage: str) -> "Encoding":
@@ -208,8 +230,15 @@ class Encoding:
             version = document.get("version") if isinstance(document, dict) else None
             raise InputError(f"{where}: encoding.version", f"is {version!r}", remedy)
         try:
-            encoding = cls(**document["slots"])
+            encoding = cls(
+                **document["slots"],
+                chain=document["chain"],
+                centre=tuple(document["normalisation"]["centre"]),
+                scale=tuple(document["normalisation"]["scale"]),
+            )
             faithful = document == encoding.document()
+            faithful &= len(encoding.scale) in (0, encoding.state_size)
+            faithful &= len(encoding.scale) == len(encoding.centre)
         except (KeyError, TypeError, ValueError):
             faithful = False
         if not faithful:

@@ -94,7 +94,8 @@ def chain_log_probabilities(chain: Sequence[Layers], inputs: FloatArray) -> Floa
     shape = [len(inputs)]
     log_p = np.zeros((len(inputs), 1), dtype=np.float32)
     for layers in chain:
-        conditional = _log_softmax(_forward(layers, inputs))
+        width = layers[0][0].shape[1]  # without a chain, the input without the decisions
+        conditional = _log_softmax(_forward(layers, inputs[:, :width]))
         rows, classes = conditional.shape
         log_p = log_p.reshape(-1, 1) + conditional
         decisions = np.tile(np.eye(classes, dtype=np.float32), (rows, 1))

@@ -1,8 +1,7 @@
 """Collects the training samples from the enumerated sequences (paper, Appendix; DESIGN §5)."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from itertools import permutations
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -19,11 +18,14 @@ from guided_lgp.logic import (
     parse_skeleton,
     satisfied,
     successor,
+    unsatisfied,
 )
 from guided_lgp.policy.dataset import Dataset
 from guided_lgp.policy.encoding import Encoding, FloatArray, Slots
+from guided_lgp.policy.variants import VARIANTS, Variant
 from guided_lgp.scene import Scene
 
+_LEAST_DEVIATION = 1e-3  # m; less is no information, and scaling it up would be noise
 _ENUMERATION = "the output of the stage enumerate_sequences for the same scenes"
 
 BoolArray = NDArray[np.bool_]
@@ -36,12 +38,13 @@ def build_dataset(
     shortest: Path,
     objectives: Sequence[Objective],
     slack: int,
+    variant: Variant = VARIANTS["paper"],
 ) -> Dataset:
     """Collect the samples of the training configurations and objectives.
 
     For every configuration and objective these are the coarse-feasible sequences that reach the
     objective with their last action, of the shortest feasible length or up to ``slack`` longer.
-    Each step is a sample, once for each order of the goals.
+    Each step is a sample, once for each order of the two goals.
 
     Args:
         scenes: the training configurations; they share their symbols.
@@ -49,55 +52,52 @@ def build_dataset(
         shortest: Parquet file of the shortest feasible lengths, from the same stage.
         objectives: the training objectives.
         slack: extra actions.
+        variant: what differs from the paper.
 
     Raises:
         InputError: a file is missing or does not fit the scenes; no sample results.
     """
-    encoding = Encoding()
+    encoding = Encoding(chain=variant.chain)
     symbols = _common_symbols(scenes, encoding)
     lengths = _shortest_lengths(shortest, scenes, objectives)
     verdicts = _read(sequences, ["configuration", "skeleton", "feasible", "states"])
     feasible = verdicts[verdicts["feasible"].astype(bool)]
     rows_of = {str(name): rows for name, rows in feasible.groupby("configuration")}
+    goals = _GoalCodes(objectives, encoding, encoding.fill((), scenes[0].state, symbols), variant)
 
     states, actions, configuration = [], [], []
-    sample_state, sample_objective = [], []
+    sample_state, sample_goals = [], []
     first = 0
     for index, scene in enumerate(scenes):
         rows = rows_of.get(scene.name, feasible.iloc[:0])
         paths = _feasible_sequences(scene, rows, symbols, encoding, str(sequences))
-        step, objective = np.nonzero(
-            _wanted(paths, objectives, lengths[index], slack)[paths.sequence]
-        )
-        sample_state.append(first + step)
-        sample_objective.append(objective)
+        wanted = _wanted(paths, objectives, lengths[index], slack)
+        step, objective = np.nonzero(wanted[paths.sequence])
+        codes = goals.rows(paths)[step, objective]
+        sample_state.append(np.repeat(first + step, codes.shape[1]))
+        sample_goals.append(codes.ravel())
         states.append(paths.states)
         actions.append(paths.actions)
         configuration.append(np.full(len(paths.states), index, dtype=np.int16))
         first += len(paths.states)
 
-    state_of, objective_of = np.concatenate(sample_state), np.concatenate(sample_objective)
-    if not state_of.size:
-        raise InputError(
-            str(sequences), "no training objective has a feasible sequence", _ENUMERATION
-        )
-    goals, order_of = _encode_orders(objectives, scenes[0], encoding)
-    pairs = [(state_of[objective_of == index], rows) for index, rows in enumerate(order_of)]
+    if not sum(map(len, sample_state)):
+        fault = "no training objective has a feasible sequence"
+        raise InputError(str(sequences), fault, _ENUMERATION)
+    positions = np.concatenate(states)
+    if variant.normalised:
+        encoding = _normalising(encoding, positions)
     return Dataset(
         encoding=encoding,
         symbols=symbols,
         objectives=tuple(objectives),
         configurations=tuple(scene.name for scene in scenes),
-        states=np.concatenate(states),
+        states=encoding.scaled(positions),
         actions=np.concatenate(actions),
         configuration=np.concatenate(configuration),
-        goals=goals,
-        sample_state=np.concatenate(
-            [np.tile(members, len(rows)) for members, rows in pairs]
-        ).astype(np.int32),
-        sample_goals=np.concatenate(
-            [np.repeat(rows, len(members)) for members, rows in pairs]
-        ).astype(np.int32),
+        goals=np.array(goals.codes),
+        sample_state=np.concatenate(sample_state).astype(np.int32),
+        sample_goals=np.concatenate(sample_goals).astype(np.int32),
     )
 
 
@@ -159,20 +159,51 @@ def _wanted(
     return wanted
 
 
-def _encode_orders(
-    objectives: Sequence[Objective], scene: Scene, encoding: Encoding
-) -> tuple[FloatArray, list[IntArray]]:
-    """Each objective encoded in every order of its goals, and the rows of each objective."""
-    slots = encoding.fill((), scene.state, scene.symbols)
-    orders = [list(permutations(objective)) for objective in objectives]
-    codes = [
-        encoding.encode_goals(Slots(slots.grippers, slots.boxes, slots.surfaces, goals))
-        for variants in orders
-        for goals in variants
-    ]
-    ends = np.cumsum([len(variants) for variants in orders])
-    rows = [np.arange(end - len(part), end) for end, part in zip(ends, orders, strict=True)]
-    return np.array(codes), rows
+class _GoalCodes:
+    """The distinct encoded objectives, and which of them each sample has."""
+
+    def __init__(
+        self, objectives: Sequence[Objective], encoding: Encoding, slots: Slots, variant: Variant
+    ) -> None:
+        self.codes: list[FloatArray] = []
+        self._objectives = objectives
+        self._encoding = encoding
+        self._slots = slots
+        self._variant = variant
+        self._row: dict[Objective, int] = {}
+        self._rows_in: dict[State, IntArray] = {}
+
+    def rows(self, paths: _Sequences) -> IntArray:
+        """(steps, objectives, orders) the row in ``codes`` of each objective at each step."""
+        per_step = [self._rows(state) for path in paths.progress for state in path[:-1]]
+        shape = (-1, len(self._objectives), 2 if self._variant.both_orders else 1)
+        return np.array(per_step, dtype=np.int64).reshape(shape)
+
+    def _rows(self, state: State) -> IntArray:
+        if state not in self._rows_in:
+            rows = []
+            for objective in self._objectives:
+                goals = objective
+                if self._variant.unsatisfied_goals and not satisfied(state, objective):
+                    goals = unsatisfied(state, objective)
+                orders = (goals, goals[::-1]) if self._variant.both_orders else (goals,)
+                rows.append([self._code(order) for order in orders])
+            self._rows_in[state] = np.array(rows)
+        return self._rows_in[state]
+
+    def _code(self, goals: Objective) -> int:
+        if goals not in self._row:
+            self._row[goals] = len(self.codes)
+            self.codes.append(self._encoding.encode_goals(replace(self._slots, goals=goals)))
+        return self._row[goals]
+
+
+def _normalising(encoding: Encoding, states: FloatArray) -> Encoding:
+    """The encoding with mean 0 and deviation 1 over states; what never moves keeps its scale."""
+    deviation = states.std(axis=0, dtype=np.float64)
+    scale = np.where(deviation < _LEAST_DEVIATION, 1.0, deviation)
+    centre = states.mean(axis=0, dtype=np.float64)
+    return replace(encoding, centre=tuple(centre.tolist()), scale=tuple(scale.tolist()))
 
 
 def _common_symbols(scenes: Sequence[Scene], encoding: Encoding) -> Symbols:
