@@ -1,0 +1,108 @@
+"""The kernels' derivatives, the two solvers, and the compilation."""
+
+import logging
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from guided_lgp.logic import parse_skeleton
+from guided_lgp.nlp.coarse import compiler, solver
+from guided_lgp.nlp.coarse.formulation import Formulator, Margins, SceneGeometry
+from guided_lgp.nlp.coarse.kernels import Kernel, kernels
+from guided_lgp.nlp.coarse.solver import Compiled, Interpreter, Settings
+from guided_lgp.nlp.coarse.starts import Starts
+from guided_lgp.scene import generate
+
+
+def _compiled() -> Compiled:
+    library = compiler.load_library()
+    assert library is not None
+    return Compiled(library)
+
+
+@pytest.mark.parametrize("kernel", kernels(), ids=lambda kernel: kernel.name)
+def test_jacobians_agree_with_finite_differences(kernel: Kernel) -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        x = rng.uniform(-1, 1, kernel.inputs)
+        p = rng.uniform(0.1, 0.5, kernel.parameters)
+        c, transposed = (np.array(part) for part in kernel.jacobian(x, p))
+        assert c.ravel() == pytest.approx(np.array(kernel.residual(x, p)).ravel())
+        for j, unit in enumerate(np.eye(kernel.inputs)):
+            ahead, behind = (np.array(kernel.residual(x + h * unit, p)) for h in (1e-6, -1e-6))
+            expected = (ahead - behind).ravel() / 2e-6
+            assert transposed[j] == pytest.approx(expected, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    "skeleton",
+    [
+        "(grasp pr2L red) (place pr2L red tab1)",
+        "(grasp pr2L red) (place pr2L red green) (grasp pr2R green)",
+        "(grasp pr2L red) (grasp pr2R blue) (place pr2R blue red)",
+    ],
+)
+def test_compiled_and_interpreted_loops_agree(skeleton: str) -> None:
+    scene = generate("a", 1, 11, "x").scenes[0]
+    geometry, settings = SceneGeometry(scene), Settings(steps=12)
+    formulation = Formulator(geometry, Margins()).build(parse_skeleton(skeleton))
+    fast, slow = _compiled(), Interpreter()
+    rng = np.random.default_rng(3)
+    start = Starts(geometry, fast).draw(formulation, rng, noise=0.3)
+    one = fast.solve(formulation.program, start, settings)
+    other = slow.solve(formulation.program, start, settings)
+    assert one.steps == other.steps
+    assert one.violation == pytest.approx(other.violation, abs=1e-7)
+    assert one.values == pytest.approx(other.values, abs=1e-6)
+    arguments = rng.uniform(-0.5, 0.5, (20, 15))
+    assert fast.reach(arguments) == pytest.approx(slow.reach(arguments), abs=1e-9)
+
+
+def test_variables_stay_within_their_bounds() -> None:
+    scene = generate("a", 1, 12, "x").scenes[0]
+    geometry = SceneGeometry(scene)
+    formulation = Formulator(geometry, Margins()).build(parse_skeleton("(grasp pr2R red)"))
+    program = formulation.program
+    start = np.concatenate([formulation.defaults, formulation.constants])
+    values = _compiled().solve(program, start, Settings()).values[: program.variables]
+    assert np.all(values >= program.lower)
+    assert np.all(values <= program.upper)
+
+
+def test_the_library_is_compiled_once(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    calls = []
+
+    def pretend(command: list[str], code: Path, library: Path) -> bool:
+        calls.append(command)
+        library.write_bytes(existing.read_bytes())
+        return True
+
+    assert compiler.load_library() is not None
+    existing = next(compiler.cache_folder().glob("coarse-*.so"))
+    description = compiler.pr2.urdf_path()
+    monkeypatch.setattr(compiler.pr2, "urdf_path", lambda: description)
+    monkeypatch.setattr(compiler, "_compile", pretend)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert compiler.load_library() is not None
+    assert compiler.load_library() is not None
+    assert len(calls) == 1
+    assert [file.suffix for file in (tmp_path / "guided-lgp").iterdir()] == [".so"]
+
+
+def test_without_a_compiler_the_interpreter_takes_over_and_says_so_once(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    description = compiler.pr2.urdf_path()
+    monkeypatch.setattr(compiler.pr2, "urdf_path", lambda: description)
+    monkeypatch.setattr(compiler, "find_spec", lambda name: None)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    solver.default_solver.cache_clear()
+    try:
+        with caplog.at_level(logging.WARNING):
+            assert isinstance(solver.default_solver(), Interpreter)
+            solver.default_solver()
+        assert [record.message.count("no C compiler") for record in caplog.records] == [1]
+    finally:
+        solver.default_solver.cache_clear()
