@@ -5,13 +5,11 @@ from pathlib import Path
 from PIL import Image
 
 from guided_lgp.scene import Scene
-from guided_lgp.scene.world import Camera, World
-
-CAMERA = Camera(width=720, height=540)
+from guided_lgp.scene.world import World
 
 
 def draw_scene(scene: Scene, path: Path) -> None:
     """Write a PNG picture of the scene's initial configuration; the same scene, the same bytes."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with World(scene) as world:
-        Image.fromarray(world.render(CAMERA)).save(path)
+        Image.fromarray(world.render()).save(path, optimize=True)
