@@ -1,0 +1,45 @@
+"""Tables on disk: whole, versioned, and refused with the stage that makes them."""
+
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from guided_lgp.errors import InputError
+from guided_lgp.experiments.files import read_table, write_metrics, write_table
+
+TABLE = pa.table({"name": ["a", "b"], "value": [1, 2]})
+
+
+def test_round_trip_and_same_bytes(tmp_path: Path) -> None:
+    first, second = tmp_path / "one.parquet", tmp_path / "deep" / "two.parquet"
+    write_table(first, TABLE)
+    write_table(second, TABLE)
+    assert read_table(first, "some_stage", ["name"]) == [{"name": "a"}, {"name": "b"}]
+    assert first.read_bytes() == second.read_bytes()
+    assert [path.name for path in tmp_path.iterdir() if path.is_file()] == ["one.parquet"]
+
+
+def test_faults_name_the_stage(tmp_path: Path) -> None:
+    path = tmp_path / "table.parquet"
+    with pytest.raises(InputError, match=r"is missing .*stage some_stage"):
+        read_table(path, "some_stage", ["name"])
+    path.write_bytes(b"PAR1 truncated")
+    with pytest.raises(InputError, match=r"cannot be read .*stage some_stage"):
+        read_table(path, "some_stage", ["name"])
+    pq.write_table(TABLE, path)
+    with pytest.raises(InputError, match=r"another version .*stage some_stage"):
+        read_table(path, "some_stage", ["name"])
+    write_table(path, TABLE)
+    path.write_bytes(path.read_bytes()[:-20])
+    with pytest.raises(InputError, match=r"cannot be read .*stage some_stage"):
+        read_table(path, "some_stage", ["name"])
+    write_table(path, TABLE)
+    with pytest.raises(InputError, match=r"stage some_stage"):
+        read_table(path, "some_stage", ["no such column"])
+
+
+def test_metrics_hold_numbers_only(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        write_metrics(tmp_path / "metrics.json", {"share": float("nan")})

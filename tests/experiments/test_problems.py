@@ -1,0 +1,57 @@
+"""The scalability problems: counts and least numbers of actions (Table II, DESIGN §6)."""
+
+import pytest
+
+from guided_lgp.experiments.problems import PROBLEMS, Problem
+from guided_lgp.logic import Symbols, contradiction, format_objective
+from guided_lgp.logic.strips import facts, goal_facts, relaxed_operators
+from guided_lgp.scene import generate
+from guided_lgp.search.landmark_cut import landmark_cut
+
+
+def test_counts_and_names() -> None:
+    counts = {
+        problem.name: len(
+            problem.objectives(generate(problem.setup, 1, 0, "x").scenes[0].symbols.boxes)
+        )
+        for problem in PROBLEMS
+    }
+    assert counts == {"a.1": 9, "b.1": 8, "b.2": 6, "c.1": 6, "c.2": 6, "d.1": 6, "d.2": 6}
+
+
+@pytest.mark.parametrize("problem", PROBLEMS, ids=lambda problem: problem.name)
+def test_objectives_need_the_stated_number_of_actions(problem: Problem) -> None:
+    scene = generate(problem.setup, 1, 0, "x").scenes[0]
+    objectives = problem.objectives(scene.symbols.boxes)
+    assert len(set(map(frozenset, objectives))) == len(objectives)
+    symbols = problem.unguided_symbols(scene.symbols)
+    operators = relaxed_operators(symbols)
+    for objective in objectives:
+        assert contradiction(objective) is None
+        # At least so many by the landmarks, and no more: every goal takes one grasp, one place.
+        bound = landmark_cut(facts(scene.state, symbols), goal_facts(objective), operators)
+        assert bound == problem.k_min == 2 * len(objective)
+
+
+def test_reduced_branching() -> None:
+    symbols = Symbols(("pr2L", "pr2R"), ("red", "green", "blue"), ("tab1", "tab2", "tray"))
+    starred = {problem.name for problem in PROBLEMS if problem.reduced}
+    assert starred == {"b.1", "c.1", "d.1"}
+    for problem in PROBLEMS:
+        tables = problem.unguided_symbols(symbols).tables
+        assert tables == (("tray", "tab2") if problem.reduced else symbols.tables)
+
+
+def test_objectives_spelled_out() -> None:
+    problems = {problem.name: problem for problem in PROBLEMS}
+    boxes = ("red", "green", "blue", "yellow", "purple")
+    stacks = [format_objective(objective) for objective in problems["a.1"].objectives(boxes[:3])]
+    assert "(on red green) (on green blue)" in stacks
+    assert "(on red blue) (on green blue)" in stacks
+    towers = problems["d.2"].objectives(boxes)
+    assert format_objective(towers[0]) == (
+        "(on red green) (on green blue) (on blue yellow) (on yellow purple) (on purple tray)"
+    )
+    assert {tower[0].box for tower in towers} == set(boxes)  # every box is at the top once
+    for objective in problems["d.1"].objectives(boxes):
+        assert [goal.table for goal in objective].count("tray") == 2
