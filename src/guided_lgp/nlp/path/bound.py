@@ -17,8 +17,8 @@ from guided_lgp.scene.world import World
 
 _ITERATIONS = 150
 """Samples of the sampling planner per motion."""
-_ATTEMPTS = 12
-"""Ways of carrying out an action that are planned in full, per action and coarse solution."""
+_QUERIES = 150
+"""Collision queries per action and coarse solution."""
 
 
 class PathBound:
@@ -59,9 +59,7 @@ class PathBound:
         trouble = Trouble()
         others = self._coarse.solutions(skeleton, self._solutions)
         tried = 0
-        for number, solution in enumerate(
-            islice(chain([coarse_result], others), self._solutions)
-        ):
+        for number, solution in enumerate(islice(chain([coarse_result], others), self._solutions)):
             tried = number + 1
             options = Options(
                 self._scene,
@@ -72,7 +70,8 @@ class PathBound:
                 trouble,
                 number,
             )
-            outcomes = self._search(options, len(skeleton), 0, options.start)
+            limit = self._mover.queries + _QUERIES * (len(skeleton) + 2)
+            outcomes = self._search(options, limit, 0, options.start)
             if not isinstance(outcomes, list):
                 continue
             steps = [step for outcome in outcomes for step in outcome.steps]
@@ -104,17 +103,17 @@ class PathBound:
         )
 
     def _search(
-        self, options: Options, length: int, index: int, situation: Situation
+        self, options: Options, limit: int, index: int, situation: Situation
     ) -> list[Outcome] | int:
         """Carry out the actions from ``index`` on, or say which earlier one to change."""
-        if index == length:
+        if index == options.length:
             return []
         for outcome in options.of(index, situation):
-            rest = self._search(options, length, index + 1, outcome.situation)
+            rest = self._search(options, limit, index + 1, outcome.situation)
             if isinstance(rest, list):
                 return [outcome, *rest]
             if rest < index:
                 return rest
-            if options.attempts > _ATTEMPTS * length:
+            if self._mover.queries > limit:
                 return -1
         return options.culprit(index)

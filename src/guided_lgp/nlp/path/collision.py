@@ -30,8 +30,8 @@ from guided_lgp.scene.pr2 import (
 )
 from guided_lgp.scene.world import TABLE_THICKNESS
 
-PADDING = 0.002
-"""Distance (m) that the robot's links keep from everything."""
+PADDING = 0.003
+"""Distance (m) that everything keeps from everything, declared contacts apart."""
 
 
 @dataclass(frozen=True)
@@ -81,10 +81,12 @@ class CollisionChecker:
         tool = {g: self._model.frames[self._model.getFrameId(TOOL_LINK[g])] for g in GRIPPERS}
         self._tool = {g: (frame.parentJoint, frame.placement) for g, frame in tool.items()}
         self._candidates = self._candidate_pairs(len(scene.tables) + len(scene.boxes))
-        self._geometry.addAllCollisionPairs()
+        for first, second in zip(*np.nonzero(np.triu(self._candidates, 1)), strict=True):
+            self._geometry.addCollisionPair(pin.CollisionPair(int(first), int(second)))
         self._data = self._model.createData()
         self._geometry_data = self._geometry.createData()
-        self._set_margins(len(scene.tables) + len(scene.boxes))
+        for request in self._geometry_data.collisionRequests:
+            request.security_margin = PADDING
         self._broad = pin.BroadPhaseManager_NaiveCollisionManager(
             self._model, self._geometry, self._geometry_data
         )
@@ -159,20 +161,14 @@ class CollisionChecker:
 
     def _candidate_pairs(self, objects: int) -> NDArray[np.bool_]:
         """Pairs that can ever be checked: not the SRDF's, nor bodies of one link."""
-        count = len(self._names)
-        pairs = np.ones((count, count), dtype=bool)
-        disabled = disabled_pairs()
-        for i in range(count - objects):
-            for j in range(count - objects):
-                same = self._names[i] == self._names[j]
-                pairs[i, j] = not same and frozenset((self._names[i], self._names[j])) not in disabled
+        joints = np.array([body.parentJoint for body in self._geometry.geometryObjects])
+        pairs = joints[:, None] != joints[None, :]
+        pairs[-objects:] = pairs[:, -objects:] = True
+        for one, other in map(tuple, disabled_pairs()):
+            if one in self._index and other in self._index:
+                first, second = self._index[one], self._index[other]
+                pairs[first, second] = pairs[second, first] = False
         return pairs
-
-    def _set_margins(self, objects: int) -> None:
-        count = len(self._names)
-        margins = np.full((count, count), PADDING)
-        margins[count - objects :, count - objects :] = 0.0
-        self._geometry_data.setSecurityMargins(self._geometry, margins, True)
 
 
 @cache

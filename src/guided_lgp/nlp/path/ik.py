@@ -25,6 +25,7 @@ REACH = np.array([1.0, 0.9, 0.75, 0.65, 0.35, 0.3, 0.16])
 """Bounds (m) on how far a point of hand or held box moves per rad of each joint."""
 
 _LIMITS = JOINT_LIMITS[:7] + np.array([1e-4, -1e-4])
+_LIMITS[[3, 5], 1] = -0.08  # a straight elbow or wrist is singular: joints race near it
 _CONTINUOUS = np.array([4, 6])
 _TURN = 2 * np.pi
 

@@ -15,6 +15,8 @@ from guided_lgp.scene.pr2 import arm_slice
 
 LINE_STEP = 0.01
 """Distance (m) of configurations along a straight line."""
+_ASTRAY = 0.001
+"""How far (m, tenths of rad) the tool may leave a straight line between two configurations."""
 _ROUNDINGS = (0.35, 0.1)
 """Shares of a corner's edges that its rounding may take."""
 _SHORTCUTS = 12
@@ -48,6 +50,8 @@ class Mover:
         self.arms = {gripper: Arm(scene, gripper) for gripper in GRIPPERS}
         self._checker = CollisionChecker(scene)
         self._iterations = iterations
+        self.queries = 0
+        """Collision queries so far: the measure of effort."""
 
     def collision(self, still: Still, q: Array) -> tuple[str, str] | None:
         """The first pair of bodies in collision along configurations (n, 7) of the moving arm."""
@@ -71,7 +75,13 @@ class Mover:
         count = 2 + int(np.linalg.norm(direction) / LINE_STEP)
         position = tool[1] + np.linspace(0.0, 1.0, count)[:, None] * direction
         q, valid = arm.inverse(tool[0], position, np.full(count, pan))
-        return continuous_path(q[:, side], valid[:, side])
+        path = continuous_path(q[:, side], valid[:, side])
+        if path is None:
+            return None
+        rotation, middle = arm.forward((path[:-1] + path[1:]) / 2)
+        astray = np.abs(middle - (position[:-1] + position[1:]) / 2).max()
+        turned_by = np.abs(rotation - tool[0]).max()
+        return path if astray < _ASTRAY and turned_by < 10 * _ASTRAY else None
 
     def transit(
         self, still: Still, start: Array, goal: Array, rng: np.random.Generator
@@ -102,14 +112,10 @@ class Mover:
         yaw = float(np.arctan2(turn[1, 0], turn[0, 0]))
         if not np.allclose(turned(rotation[0], np.array([yaw]))[0], rotation[1], atol=1e-6):
             return None
-        solutions, _ = arm.inverse(rotation, position, np.array([start[0], goal[0]]))
-        sides = [
-            int(np.argmin(np.abs(np.sin((q - end) / 2)).sum(axis=1)))
-            for q, end in zip(solutions, (start, goal), strict=True)
-        ]
-        if sides[0] != sides[1]:
+        side = self.side(arm.gripper, start)
+        if self.side(arm.gripper, goal) != side:
             return None
-        space = LevelSpace(self._space(still), arm, rotation[0], sides[0])
+        space = LevelSpace(self._space(still), arm, rotation[0], side)
         ends = np.array([[*position[0], 0.0, start[0]], [*position[1], yaw, goal[0]]])
         points = connect(space, ends[0], ends[1], rng, self._iterations)
         if points is None:
@@ -123,7 +129,14 @@ class Mover:
             paths.append(wound(path, start if not paths else paths[-1][-1]))
         return paths
 
+    def side(self, gripper: str, q: Array) -> int:
+        """On which side (0 or 1) of the inverse kinematics the elbow is for joints (7,)."""
+        arm = self.arms[gripper]
+        solutions, _ = arm.inverse(*arm.forward(q), q[0])
+        return int(np.argmin(np.abs(np.sin((solutions - q) / 2)).sum(axis=1)))
+
     def _space(self, still: Still) -> JointSpace:
+        self.queries += 1
         self._checker.enter(still.mode)
         return JointSpace(self._checker, self.arms[still.mode.gripper], still.q, still.fingers)
 

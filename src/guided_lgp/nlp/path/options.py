@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 
 import numpy as np
 
@@ -38,6 +39,8 @@ _ELBOWS = 3
 """Elbow postures per grip or placement whose motions are planned."""
 _FORESEEN = 10
 """Elbow postures at the later place that are looked at per grip."""
+_OUTCOMES = 4
+"""Ways to carry out an action that are passed on, before an earlier action is changed."""
 _SAMPLES = 24
 """Placements tried beside the coarse bound's."""
 
@@ -114,6 +117,7 @@ class Options:
         self._mover = mover
         self._arms = mover.arms
         self._skeleton = skeleton
+        self.length = len(skeleton)
         self._contacts = contacts
         self._trouble = trouble
         self._rng = np.random.default_rng(np.random.SeedSequence([7, seed]))
@@ -123,8 +127,6 @@ class Options:
         self._states = [scene.state]
         for action in skeleton:
             self._states.append(successor(self._states[-1], action))
-        self.attempts = 0
-        """Motions planned so far: the measure of effort."""
         self.start = Situation(
             scene.state,
             np.concatenate([HOME[gripper] for gripper in GRIPPERS]),
@@ -141,7 +143,7 @@ class Options:
                 outcomes = self._grasps(index, presented)
             else:
                 outcomes = self._places(index, presented)
-            for outcome in outcomes:
+            for outcome in islice(outcomes, _OUTCOMES):
                 tidied = self._tidied(index, outcome.situation)
                 if tidied is not None:
                     rest, final = tidied
@@ -152,7 +154,11 @@ class Options:
         action = self._skeleton[index]
         if action.instruction == "grasp":
             return index - 1
-        return next(j for j in range(index - 1, -1, -1) if self._skeleton[j].box == action.box)
+        return next(
+            j
+            for j in range(index - 1, -1, -1)
+            if action.box in (self._skeleton[j].box, self._root(j)[0])
+        )
 
     # -- Held boxes as supports ------------------------------------------------------------
 
@@ -160,9 +166,8 @@ class Options:
         self, index: int, situation: Situation
     ) -> Iterator[tuple[tuple[Step, ...], Situation]]:
         """Bring the held box on which the action takes place, if any, to where it is needed."""
-        action, state = self._skeleton[index], situation.state
-        below = action.table if action.instruction == "place" else state.support_of(action.box)
-        root, holder = self._holder_below(state, below)
+        state = situation.state
+        root, holder = self._root(index)
         if root is None or holder is None:
             yield (), situation
             return
@@ -176,6 +181,8 @@ class Options:
         now = situation.q[arm_slice(holder)]
         reach = self._reach(index, arm, rotation, tool[None, :3], tool[None, :3])
         still = situation.still(holder)
+        if loaded:
+            reach = self._level_reach(reach, holder, situation)
         for _, pan, side in reach.order()[: 2 * _ELBOWS]:
             goal = continuous_near(reach.q[0, 0, pan, side], now)
             blocked = self._mover.collision(still, goal[None])
@@ -271,7 +278,6 @@ class Options:
         choice: tuple[int, int, int],
     ) -> Outcome | None:
         """Plan all motions of a grasp, straight lines first."""
-        self.attempts += 1
         action, state = self._skeleton[index], situation.state
         gripper, box = action.gripper, action.box
         number, pan, side = choice
@@ -397,7 +403,10 @@ class Options:
         grasp = inverse(matrix_pose(grips.rotation[grip], grips.offset[grip]))
         box_pose = self._contacts[later].boxes[box]
         riders = {
-            rider: (gripper, compose(grasp, compose(inverse(box_pose), self._contacts[later].boxes[rider])))
+            rider: (
+                gripper,
+                compose(grasp, compose(inverse(box_pose), self._contacts[later].boxes[rider])),
+            )
             for rider in self._states[later].carried_by(box)
         }
         holding = replace(expected, carried={box: (gripper, grasp), **riders})
@@ -411,7 +420,9 @@ class Options:
                 self._note(later, 1, "placing collision", blocked)
                 continue
             standing = {**expected.standing, box: targets[number // count]}
-            left = replace(self._opened(expected, gripper), standing=standing, state=self._states[later + 1])
+            left = replace(
+                self._opened(expected, gripper), standing=standing, state=self._states[later + 1]
+            )
             back = arm.inverse(
                 reach.rotation[number],
                 reach.contact[number] - APPROACH * reach.rotation[number][:, 0],
@@ -451,6 +462,8 @@ class Options:
         tools = compose(targets, inverse(situation.carried[box][1]))
         rotation, contact = rotation_matrix(tools[:, 3:]), tools[:, :3]
         reach = self._reach(index, self._arms[gripper], rotation, contact, contact + LIFT * _UP)
+        if situation.state.carried_by(box):
+            reach = self._level_reach(reach, gripper, situation)
         if not np.isfinite(reach.cost).any():
             self._trouble.note(index, 0, f"no inverse kinematics to place {box}")
             return
@@ -479,7 +492,6 @@ class Options:
         self, index: int, situation: Situation, reach: _Reach, choice: tuple[int, int, int]
     ) -> Outcome | None:
         """Plan all motions of a place, straight lines first."""
-        self.attempts += 1
         action, state = self._skeleton[index], situation.state
         assert action.table is not None
         gripper, box = action.gripper, action.box
@@ -496,7 +508,7 @@ class Options:
             return None
         lowered = self._after(situation, [Motion(gripper, line[::-1])])
         opening, release = Fingers(gripper, FINGER_LIMITS[1]), Release((box, *riders))
-        hand_over = self._hand_over(state, (box, *riders), action.table)
+        hand_over = self._hand_over(index, (box, *riders))
         left = self._after(lowered, [release, *hand_over, opening])
         left = replace(left, state=self._states[index + 1])
         for direction in _retreats(tool[0][:, 0]):
@@ -531,16 +543,18 @@ class Options:
             return Outcome(steps, final, lowered.keyframe(self._arms))
         return None
 
-    def _hand_over(self, state: State, boxes: tuple[str, ...], table: str) -> list[Step]:
+    def _hand_over(self, index: int, boxes: tuple[str, ...]) -> list[Step]:
         """Boxes placed on one that the other gripper carries move with that one from then on."""
-        holder = self._holder_below(state, table)[1]
+        holder = self._root(index)[1]
         return [] if holder is None else [Attach(boxes, holder)]
 
-    def _holder_below(self, state: State, table: str | None) -> tuple[str | None, str | None]:
-        """The lowest support under a table or box, and who holds it, if anyone."""
-        while table in self._boxes and state.support_of(table) is not None:
-            table = state.support_of(table)
-        return table, None if table is None else state.holder(table)
+    def _root(self, index: int) -> tuple[str | None, str | None]:
+        """The lowest body below the place of an action, and who holds it, if anyone."""
+        action, state = self._skeleton[index], self._states[index]
+        root = action.table if action.instruction == "place" else state.support_of(action.box)
+        while root is not None and state.support_of(root) is not None:
+            root = state.support_of(root)
+        return root, None if root is None else state.holder(root)
 
     def _alternatives(
         self, index: int, situation: Situation, support: Array, reference: Array
@@ -560,11 +574,16 @@ class Options:
                 top = self._top(table, self._contacts[j])
                 placement = placement_of(top, self._contacts[j].boxes[other.box])
                 others.append((placement, self._half(other.box)))
-        half = (
-            np.array(self._tables[table].half_extents) if on_table else self._half(table)
-        )
+        half = np.array(self._tables[table].half_extents) if on_table else self._half(table)
         return alternatives(
-            reference, half, self._half(box), self._masses(index), others, on_table, self._rng, _SAMPLES
+            reference,
+            half,
+            self._half(box),
+            self._masses(index),
+            others,
+            on_table,
+            self._rng,
+            _SAMPLES,
         )
 
     def _masses(self, index: int) -> Array:
@@ -583,9 +602,7 @@ class Options:
 
     # -- Shared ------------------------------------------------------------------------------
 
-    def _reach(
-        self, index: int, arm: Arm, rotation: Array, contact: Array, off: Array
-    ) -> _Reach:
+    def _reach(self, index: int, arm: Arm, rotation: Array, contact: Array, off: Array) -> _Reach:
         """Solve the inverse kinematics of N tool poses at the contact and off it."""
         q = self._contacts[index].q[arm_slice(arm.gripper)]
         pans = np.append(_PANS * arm.sign[0], q[0])
@@ -597,6 +614,15 @@ class Options:
         cost = np.where(valid.all(axis=1), distance, np.inf)
         return _Reach(rotation, contact, q, pans, cost)
 
+    def _level_reach(self, reach: _Reach, gripper: str, situation: Situation) -> _Reach:
+        """What a level motion can reach: the elbow's side stays; the nearest first."""
+        now = situation.q[arm_slice(gripper)]
+        side = self._mover.side(gripper, now)
+        distance = np.linalg.norm((continuous_near(reach.q[:, 1], now) - now) * REACH, axis=-1)
+        cost = np.where(np.isfinite(reach.cost), distance, np.inf)
+        cost[..., 1 - side] = np.inf
+        return replace(reach, cost=cost)
+
     def _line(
         self, still: Still, tool: tuple[Array, Array], direction: Array, pan: float, side: int
     ) -> Array | str:
@@ -607,9 +633,7 @@ class Options:
         blocked = self._mover.collision(still, path)
         return path if blocked is None else f"collision {' '.join(blocked)}"
 
-    def _transit(
-        self, still: Still, start: Array, goal: Array, level: bool
-    ) -> list[Array] | None:
+    def _transit(self, still: Still, start: Array, goal: Array, level: bool) -> list[Array] | None:
         plan = self._mover.level_transit if level else self._mover.transit
         return plan(still, start, goal, self._rng)
 

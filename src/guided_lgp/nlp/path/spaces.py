@@ -9,8 +9,10 @@ from guided_lgp.nlp.path.ik import REACH, Arm, continuous_near, unwrapped
 from guided_lgp.nlp.results import Array
 from guided_lgp.scene.pr2 import JOINT_LIMITS, arm_slice
 
-STEP = 0.02
-"""Largest motion (m) of any point of the arm between two checked configurations."""
+STEP = 0.015
+"""Largest motion (m), by the levers' bound, of any point between two checked configurations."""
+_LEVEL_STEP = 0.007
+"""The same for level motions, where the motion is known and not a bound."""
 _JUMP = 0.35
 """Largest change (rad) of a joint in one step of a level motion or a straight line; beyond it the
 inverse kinematics jumped."""
@@ -69,7 +71,7 @@ class LevelSpace:
 
     def path(self, start: Array, end: Array) -> Array | None:
         """Configurations of the arm (n, 7) along the line, or None out of reach."""
-        count = 2 + int(np.sum(np.abs(end - start) * (1, 1, 1, 0.25, 0.5)) / STEP)
+        count = 2 + int(np.sum(np.abs(end - start) * (1, 1, 1, 0.25, 0.5)) / _LEVEL_STEP)
         points = np.linspace(start, end, count)
         rotation = turned(self._rotation, points[:, 3])
         q, valid = self._arm.inverse(rotation, points[:, :3], points[:, 4])

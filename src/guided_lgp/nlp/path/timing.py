@@ -52,5 +52,20 @@ def time_path(path: Array, gripper: str) -> tuple[Array, Array]:
         parametrizer="ParametrizeConstAccel",
     )
     trajectory = instance.compute_trajectory(0, 0)
-    times = np.linspace(0.0, trajectory.duration, 1 + int(np.ceil(trajectory.duration / INTERVAL)))
-    return times, np.asarray(trajectory(times))
+    count = 1 + int(np.ceil(trajectory.duration / INTERVAL))
+    times, step = np.linspace(0.0, trajectory.duration, count, retstep=True)
+    rows = np.asarray(trajectory(times))
+    rows[0], rows[-1] = path[0], path[-1]
+    return times * _stretch(rows, float(step), velocity, acceleration), rows
+
+
+def _stretch(rows: Array, step: float, velocity: Array, acceleration: Array) -> float:
+    """The factor on time that keeps the limits between toppra's grid points, too.
+
+    Finite differences of rows (T, 7) at equal steps (s), before and after at rest.
+    """
+    rates = np.diff(rows, axis=0) / step
+    changes = np.diff(np.vstack([np.zeros(7), rates, np.zeros(7)]), axis=0) / step
+    changes[[0, -1]] *= 2.0  # from rest to the middle of the first interval: half a step
+    excess = max(np.max(np.abs(rates) / velocity), np.sqrt(np.max(np.abs(changes) / acceleration)))
+    return max(1.0, float(excess))
