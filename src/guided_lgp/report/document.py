@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup
 
 from guided_lgp.report.table import Table, plain
 
@@ -110,6 +109,6 @@ def _is(kind: type, block: object) -> bool:
     return isinstance(block, kind)
 
 
-def _embed(path: Path) -> Markup:
+def _embed(path: Path) -> str:
     kind = "image/svg+xml" if path.suffix == ".svg" else "image/png"
-    return Markup(f"data:{kind};base64,{b64encode(path.read_bytes()).decode()}")
+    return f"data:{kind};base64,{b64encode(path.read_bytes()).decode()}"

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from PIL import Image
+from matplotlib.image import imsave
 
 from guided_lgp.scene import Scene
 from guided_lgp.scene.world import World
@@ -12,4 +12,4 @@ def draw_scene(scene: Scene, path: Path) -> None:
     """Write a PNG picture of the scene's initial configuration; the same scene, the same bytes."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with World(scene) as world:
-        Image.fromarray(world.render()).save(path, optimize=True)
+        imsave(path, world.render())
