@@ -79,11 +79,12 @@ class TrainPolicy(_Section):
 
 
 class SearchLimits(_Section):
-    """Limits of the guided search (paper, Appendix)."""
+    """Limits of a search: depth and reattempts of the guided one, nodes and paths of any."""
 
     max_depth: Annotated[int, Field(strict=True, ge=1, le=100)]
     reattempts: Annotated[int, Field(strict=True, ge=0, le=1000)]
     max_tree_size: Count
+    max_paths: Annotated[int, Field(strict=True, ge=1, le=10_000)]
 
 
 class Params(_Section):

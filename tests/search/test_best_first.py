@@ -19,7 +19,7 @@ def left_hand_fails(skeleton: Skeleton) -> bool:
 
 @pytest.mark.parametrize("ordering", BOTH)
 def test_a_uniform_policy_solves_four_actions(scene: Scene, ordering: Ordering) -> None:
-    limits = SearchLimits(max_depth=4, reattempts=0, max_tree_size=20_000)
+    limits = SearchLimits(max_depth=4, reattempts=0, max_tree_size=20_000, max_paths=1000)
     bounds = ScriptedBounds(scene)
     result = best_first.plan(
         scene, TOWER, scene.symbols, bounds, UNIFORM, limits, ordering=ordering
@@ -82,7 +82,7 @@ def test_same_search_twice(scene: Scene, limits: SearchLimits) -> None:
 def test_a_policy_that_goes_in_circles(scene: Scene) -> None:
     """It loves to move green to and fro; the search still turns to red soon."""
     circles = Scorer(lambda objective, state, action: 6.0 * (action.box == "green"))
-    limits = SearchLimits(max_depth=20, reattempts=0, max_tree_size=400_000)
+    limits = SearchLimits(max_depth=20, reattempts=0, max_tree_size=400_000, max_paths=1000)
     result = best_first.plan(
         scene,
         parse_objective(["(on red tab2)"]),

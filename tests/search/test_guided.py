@@ -67,7 +67,7 @@ def test_reattempt_after_an_infeasible_path(scene: Scene, limits: SearchLimits) 
 
 def test_maximum_depth_ends_attempts(scene: Scene) -> None:
     never = Scorer(lambda objective, state, action: -9.0 * (action.box == "red"))
-    limits = SearchLimits(max_depth=3, reattempts=2, max_tree_size=20_000)
+    limits = SearchLimits(max_depth=3, reattempts=2, max_tree_size=20_000, max_paths=1000)
     bounds = ScriptedBounds(scene)
     result = guided.plan(
         scene, parse_objective(["(held red)"]), scene.symbols, bounds, never, limits
@@ -81,7 +81,7 @@ def test_maximum_depth_ends_attempts(scene: Scene) -> None:
 
 def test_failed_nodes_are_never_tried_again(scene: Scene) -> None:
     bounds = ScriptedBounds(scene, coarse=lambda skeleton: False)
-    limits = SearchLimits(max_depth=8, reattempts=100, max_tree_size=20_000)
+    limits = SearchLimits(max_depth=8, reattempts=100, max_tree_size=20_000, max_paths=1000)
     result = guided.plan(scene, TOWER, scene.symbols, bounds, UNIFORM, limits)
     assert result.reason == "exhausted"
     assert result.tree_size == 7

@@ -21,7 +21,7 @@ from guided_lgp.search.landmark_cut import landmark_cut
 from guided_lgp.search.result import SearchResult
 from guided_lgp.search.tree import StateSpace, distances
 
-LIMITS = SearchLimits(max_depth=12, reattempts=0, max_tree_size=400_000)
+LIMITS = SearchLimits(max_depth=12, reattempts=0, max_tree_size=400_000, max_paths=1000)
 TOWER = parse_objective(["(on red green)", "(on green blue)"])
 RIVALS = [graph.plan, classical.plan]
 Planner = Callable[..., SearchResult]

@@ -56,8 +56,8 @@ def plan(
 
     frontier = [entry(tree.root)]
     while frontier:
-        if tree.size >= limits.max_tree_size:
-            return run.result(tree.size, "stopped")
+        if limit := run.limit_reached(tree.size, limits):
+            return run.result(tree.size, limit)
         known_cost, *_, node = heappop(frontier)
         updated = entry(node)
         if updated[0] > known_cost:  # its state has been visited since

@@ -14,7 +14,7 @@ def plan(
     """Expand the logic tree in order until a sequence that satisfies the objective is feasible.
 
     Equal states are not merged, and an infeasible sequence is expanded like any other: this is
-    the plain tree of the original LGP. Only ``limits.max_tree_size`` ends the search.
+    the plain tree of the original LGP. It has no maximum depth.
 
     Raises:
         InputError: the objective is contradictory, unknown or already satisfied.
@@ -24,10 +24,12 @@ def plan(
     tree = LogicTree(symbols, scene.state)
     goals = GoalStates(tree.space, objective)
     node = 0
-    while node < len(tree) < limits.max_tree_size:
+    while node < len(tree):
+        if limit := run.limit_reached(len(tree), limits):
+            return run.result(len(tree), limit)
         run.expansions += 1
         for child in tree.expand(node):
             if tree.state[child] in goals and run.solve(tree.skeleton(child)):
                 return run.result(len(tree))
         node += 1
-    return run.result(len(tree), "stopped" if node < len(tree) else "exhausted")
+    return run.result(len(tree), "exhausted")

@@ -33,8 +33,8 @@ def plan(
     rejected: set[Skeleton] = set()
     frontier = [(estimate(0), estimate(0), 0, 0)]
     while frontier:
-        if len(tree) >= limits.max_tree_size:
-            return run.result(len(tree), "stopped")
+        if limit := run.limit_reached(len(tree), limits):
+            return run.result(len(tree), limit)
         _, _, node, depth = heappop(frontier)
         if rejected and _begins_with(tree.skeleton(node), rejected):
             continue

@@ -32,9 +32,11 @@ def plan(
         for skeleton in graph.sequences(length):
             if run.solve(skeleton):
                 return run.result(graph.size)
+            if limit := run.limit_reached(graph.size, limits):
+                return run.result(graph.size, limit)
             graph.excluded.add(run.failed)
-        if graph.size >= limits.max_tree_size:
-            return run.result(graph.size, "stopped")
+        if limit := run.limit_reached(graph.size, limits):
+            return run.result(graph.size, limit)
     return run.result(graph.size, "exhausted")
 
 

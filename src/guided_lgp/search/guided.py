@@ -115,8 +115,8 @@ def plan(
         run.attempt_failed(cause)
         if not unexplored:
             return run.result(tree.size, "exhausted")
-        if tree.size >= limits.max_tree_size:
-            return run.result(tree.size, "stopped")
+        if limit := run.limit_reached(tree.size, limits):
+            return run.result(tree.size, limit)
         node = heappop(unexplored)[-1]
     return run.result(tree.size, "attempts")
 

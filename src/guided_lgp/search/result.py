@@ -7,17 +7,20 @@ from typing import Literal
 
 from guided_lgp.logic import Action, Objective, Skeleton, State, format_skeleton
 from guided_lgp.nlp.results import Array, CoarseResult, Failure, PathResult
+from guided_lgp.params import SearchLimits
 from guided_lgp.search.bounds import Bounds
 from guided_lgp.search.policy import Policy
 
 Cause = Literal["infeasible", "max_depth"]
 """Why an attempt of the guided search ended (paper, Table I)."""
 
-Reason = Literal["stopped", "exhausted", "attempts"]
-"""Why a search ended without a plan: node limit, nothing left to expand, or no reattempt left."""
+Reason = Literal["stopped", "paths", "exhausted", "attempts"]
+"""Why a search ended without a plan: limit of nodes or of paths, nothing left to expand, or no
+reattempt left."""
 
 _REASONS: Mapping[Reason, str] = {
     "stopped": "stopped at the limit of the tree size",
+    "paths": "stopped at the limit of sequences without a path",
     "exhausted": "every sequence within the depth limit is infeasible",
     "attempts": "the last allowed attempt failed",
 }
@@ -158,6 +161,12 @@ class Run:
         self._waited += elapsed
         self._policy_calls += 1
         return scores
+
+    def limit_reached(self, tree_size: int, limits: SearchLimits) -> Reason | None:
+        """The limit that ends the search, if one is reached."""
+        if self._path_calls >= limits.max_paths:
+            return "paths"
+        return "stopped" if tree_size >= limits.max_tree_size else None
 
     def attempt_failed(self, cause: Cause) -> None:
         """Note the end of an attempt."""
