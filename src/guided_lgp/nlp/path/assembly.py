@@ -46,7 +46,7 @@ def assemble(start: Situation, steps: Iterable[Step]) -> Trajectory:
             case Attach(boxes, gripper):
                 ended = [box for box in boxes if box in open_since]
                 attachments += [Attachment(box, *open_since.pop(box), count - 1) for box in ended]
-                open_since |= {box: (gripper, count - 1) for box in boxes}
+                open_since |= dict.fromkeys(boxes, (gripper, count - 1))
                 continue
             case Release(boxes):
                 attachments += [Attachment(box, *open_since.pop(box), count - 1) for box in boxes]

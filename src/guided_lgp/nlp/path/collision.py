@@ -168,7 +168,7 @@ class CollisionChecker:
             if one in self._index and other in self._index:
                 first, second = self._index[one], self._index[other]
                 pairs[first, second] = pairs[second, first] = False
-        return pairs
+        return np.asarray(pairs)
 
 
 @cache

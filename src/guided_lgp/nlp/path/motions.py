@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -11,7 +12,6 @@ from guided_lgp.nlp.path.ik import Arm
 from guided_lgp.nlp.path.spaces import JointSpace, LevelSpace, continuous_path, turned, wound
 from guided_lgp.nlp.results import Array
 from guided_lgp.scene import GRIPPERS, Scene
-from guided_lgp.scene.pr2 import arm_slice
 
 LINE_STEP = 0.01
 """Distance (m) of configurations along a straight line."""
@@ -122,8 +122,8 @@ class Mover:
             return None
         if len(points) > 2:
             points = shortcut(space, points, rng, _SHORTCUTS)
-        paths = []
-        for first, last in zip(points[:-1], points[1:], strict=True):
+        paths: list[Array] = []
+        for first, last in pairwise(points):
             path = space.path(first, last)
             assert path is not None  # the planner has followed it
             paths.append(wound(path, start if not paths else paths[-1][-1]))

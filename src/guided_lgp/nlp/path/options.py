@@ -6,7 +6,7 @@ from itertools import islice
 
 import numpy as np
 
-from guided_lgp.logic import Skeleton, State, successor
+from guided_lgp.logic import Skeleton, successor
 from guided_lgp.nlp.path.grips import Grips
 from guided_lgp.nlp.path.ik import REACH, Arm, continuous_near
 from guided_lgp.nlp.path.motions import Motion, Mover, Still
@@ -88,7 +88,9 @@ class _Reach:
         cost = self.cost if extra is None else self.cost + extra[:, None, None]
         flat = np.argsort(cost, axis=None, kind="stable")
         flat = flat[: int(np.isfinite(cost).sum())]
-        return [tuple(map(int, row)) for row in zip(*np.unravel_index(flat, cost.shape))]  # type: ignore[misc]
+        return [
+            (int(n), int(p), int(s)) for n, p, s in np.transpose(np.unravel_index(flat, cost.shape))
+        ]
 
 
 @dataclass(frozen=True)
@@ -319,14 +321,14 @@ class Options:
             if go is None:
                 self._trouble.note(index, 8, f"no motion found from the grasp of {box}")
                 continue
-            steps = (
+            steps: tuple[Step, ...] = (
                 Fingers(gripper, FINGER_LIMITS[1]),
                 *(Motion(gripper, path) for path in (*come, inward)),
                 closed,
                 attach,
                 *(Motion(gripper, path) for path in (upward, *go)),
             )
-            final = self._after(held, [step for step in steps[-1 - len(go) :]])
+            final = self._after(held, steps[-1 - len(go) :])
             return Outcome(steps, final, reached.keyframe(self._arms))
         return None
 
@@ -532,7 +534,7 @@ class Options:
             if go is None:
                 self._trouble.note(index, 8, f"no motion found from the place of {box}")
                 continue
-            steps = (
+            steps: tuple[Step, ...] = (
                 *(Motion(gripper, path) for path in (*come, downward)),
                 release,
                 *hand_over,

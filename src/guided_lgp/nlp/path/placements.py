@@ -54,7 +54,7 @@ def alternatives(
         rng: source of randomness.
         count: largest number of samples to return.
     """
-    half_turn = reference + [0.0, 0.0, np.pi]
+    half_turn = reference + np.array([0.0, 0.0, np.pi])
     if on_table:
         low = np.array([*-support_half, -np.pi])
         drawn = rng.uniform(low, -low, (_SAMPLES_DRAWN, 3))

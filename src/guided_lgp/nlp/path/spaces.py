@@ -103,4 +103,4 @@ def turned(rotation: Array, yaw: Array) -> Array:
 def wound(path: Array, start: Array) -> Array:
     """A motion (n, 7) with its continuous joints turned to begin next to ``start`` (7,)."""
     first = continuous_near(path[0], start)
-    return path + (first - path[0])
+    return np.asarray(path + (first - path[0]))
