@@ -26,6 +26,7 @@ from guided_lgp.policy.variants import VARIANTS, Variant
 from guided_lgp.scene import Scene
 
 _LEAST_DEVIATION = 1e-3  # m; less is no information, and scaling it up would be noise
+_NONE = -1
 _ENUMERATION = "the output of the stage enumerate_sequences for the same scenes"
 
 BoolArray = NDArray[np.bool_]
@@ -74,8 +75,9 @@ def build_dataset(
         wanted = _wanted(paths, objectives, lengths[index], slack)
         step, objective = np.nonzero(wanted[paths.sequence])
         codes = goals.rows(paths)[step, objective]
-        sample_state.append(np.repeat(first + step, codes.shape[1]))
-        sample_goals.append(codes.ravel())
+        sample, _ = np.nonzero(codes != _NONE)
+        sample_state.append(first + step[sample])
+        sample_goals.append(codes[codes != _NONE])
         states.append(paths.states)
         actions.append(paths.actions)
         configuration.append(np.full(len(paths.states), index, dtype=np.int16))
@@ -174,22 +176,27 @@ class _GoalCodes:
         self._rows_in: dict[State, IntArray] = {}
 
     def rows(self, paths: _Sequences) -> IntArray:
-        """(steps, objectives, orders) the row in ``codes`` of each objective at each step."""
+        """(steps, objectives, 4) the rows in ``codes`` of each objective at each step.
+
+        The last axis has the objective and the adapted objective, each in both orders, or -1.
+        """
         per_step = [self._rows(state) for path in paths.progress for state in path[:-1]]
-        shape = (-1, len(self._objectives), 2 if self._variant.both_orders else 1)
-        return np.array(per_step, dtype=np.int64).reshape(shape)
+        return np.array(per_step, dtype=np.int64).reshape(-1, len(self._objectives), 4)
 
     def _rows(self, state: State) -> IntArray:
         if state not in self._rows_in:
-            rows = []
-            for objective in self._objectives:
-                goals = objective
-                if self._variant.unsatisfied_goals and not satisfied(state, objective):
-                    goals = unsatisfied(state, objective)
-                orders = (goals, goals[::-1]) if self._variant.both_orders else (goals,)
-                rows.append([self._code(order) for order in orders])
-            self._rows_in[state] = np.array(rows)
+            rows = np.full((len(self._objectives), 4), _NONE)
+            for row, objective in zip(rows, self._objectives, strict=True):
+                row[:2] = self._orders(objective)
+                remaining = unsatisfied(state, objective)
+                if self._variant.adapted_goals and remaining not in ((), objective):
+                    row[2:] = self._orders(remaining)
+            self._rows_in[state] = rows
         return self._rows_in[state]
+
+    def _orders(self, goals: Objective) -> tuple[int, int]:
+        other = self._code(goals[::-1]) if self._variant.both_orders else _NONE
+        return self._code(goals), other
 
     def _code(self, goals: Objective) -> int:
         if goals not in self._row:

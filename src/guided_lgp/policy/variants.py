@@ -8,9 +8,9 @@ from dataclasses import dataclass
 class Variant:
     """How samples are made and encoded; the defaults are the paper's."""
 
-    unsatisfied_goals: bool = False
-    """Encode only the goals that do not hold yet in the samples, as objective adaptation does when
-    planning; the paper adapts objectives in planning alone."""
+    adapted_goals: bool = False
+    """Where a goal holds already, add samples with the other goal alone, which is what objective
+    adaptation asks for in planning; the paper adapts objectives in planning alone."""
     both_orders: bool = True
     """Duplicate each sample for both orders of its goals."""
     normalised: bool = False
@@ -21,8 +21,8 @@ class Variant:
 
 VARIANTS: Mapping[str, Variant] = {
     "paper": Variant(),
-    "improved": Variant(unsatisfied_goals=True, normalised=True),
-    "unsatisfied_goals": Variant(unsatisfied_goals=True),
+    "improved": Variant(adapted_goals=True, normalised=True),
+    "adapted_goals": Variant(adapted_goals=True),
     "normalised": Variant(normalised=True),
     "one_order": Variant(both_orders=False),
     "no_chain": Variant(chain=False),
