@@ -344,10 +344,10 @@ def geometry(metrics: Metrics) -> Table:
         "path_verified_share": ("Coarse-feasible with a verified path", percent),
         "path_median_s": ("Path bound with its verification, median (s)", lambda v: number(v, 2)),
         "physics_success_share": ("Goals hold after physics execution", percent),
-        "n": ("Sequences n", str),
+        "n": ("Sequences n", lambda v: number(v, 0)),
     }
     rows = [
-        (label, *(text(metrics[length][key]) for length in lengths))
+        (label, *(text(metrics[length].get(key)) for length in lengths))
         for key, (label, text) in shown.items()
     ]
     return Table(
