@@ -20,7 +20,7 @@ import typer
 from typer.exceptions import TyperException
 
 from guided_lgp.errors import InputError, WorkerError
-from guided_lgp.paths import MODELS, PARAMS
+from guided_lgp.paths import MODELS, PARAMS, SOURCES
 
 app = typer.Typer(
     name="guided-lgp",
@@ -109,6 +109,9 @@ def plan(
         bool, typer.Option("--execute", help="Carry the plan out under gravity in PyBullet.")
     ] = False,
     models: Annotated[Path, typer.Option(help="Folder with the trained policy.")] = MODELS,
+    params: Annotated[
+        Path, typer.Option(help="File with the limits: sections bounds and compare_scalability.")
+    ] = SOURCES / PARAMS,
     as_json: AsJson = False,
 ) -> None:
     """Plan a sequence of actions and its motion; ends with 1 if no plan was found.
@@ -116,13 +119,21 @@ def plan(
     Example: guided-lgp plan examples/three_boxes.json --goal "(on red green)" --goal "(held blue)"
     """
     from guided_lgp.logic import parse_objective
+    from guided_lgp.params import load_params
     from guided_lgp.planning import plan as search
     from guided_lgp.scene import load_scene
 
     start = load_scene(scene)
     objective = parse_objective(goal)
     with _spinner("planning"):
-        result = search(start, objective, planner.value, models=models, where=str(scene))
+        result = search(
+            start,
+            objective,
+            planner.value,
+            models=models,
+            params=load_params(params),
+            where=str(scene),
+        )
     times = {name: round(value, 3) for name, value in asdict(result.times).items()}
     summary = {
         "solved": result.solved,
@@ -326,9 +337,9 @@ def _fail(error: Exception, code: int, debug: bool) -> None:
     if debug:
         raise error
     text = error.format_message() if isinstance(error, TyperException) else str(error)
-    internal = code == 3 and not isinstance(error, WorkerError)
-    prefix = f"internal error: {type(error).__name__}: " if internal else "error: "
-    typer.echo(prefix + " ".join(text.split()), err=True)
+    if code == 3 and not isinstance(error, WorkerError):
+        text = f"internal error: {type(error).__name__}: {text}; --debug shows where"
+    typer.echo(f"error: {' '.join(text.split())}", err=True)
     sys.exit(code)
 
 

@@ -1,0 +1,238 @@
+"""The command line: help, exit codes, one line per error, planning end to end."""
+
+import json
+import resource
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from guided_lgp import cli
+from guided_lgp.errors import WorkerError
+
+ROOT = Path(__file__).parents[1]
+SCENE = ROOT / "examples" / "three_boxes.json"
+PLAN = ["plan", str(SCENE), "--goal", "(on red green)", "--planner", "breadth-first"]
+COMMANDS = [*cli.STAGES, "plan", "view", "doctor", "mlflow"]
+
+
+def call(*arguments: str, cwd: Path = ROOT) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "guided_lgp.cli", *arguments],
+        cwd=cwd,
+        text=True,
+        capture_output=True,
+        stdin=subprocess.DEVNULL,
+        check=False,
+        timeout=120,
+    )
+
+
+def rejected(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    """The message of a command that ends with 2 and one line on standard error."""
+    with pytest.raises(SystemExit) as ended:
+        cli.main(arguments)
+    captured = capsys.readouterr()
+    assert ended.value.code == 2
+    assert captured.out == ""
+    assert captured.err.count("\n") == 1
+    assert captured.err.startswith("error: ")
+    return captured.err.removeprefix("error: ").rstrip("\n")
+
+
+def edited(folder: Path, **changes: Any) -> Path:
+    """A scene file with other top-level fields."""
+    file = folder / "scene.json"
+    file.write_text(json.dumps(json.loads(SCENE.read_text()) | changes))
+    return file
+
+
+def test_help_takes_less_than_a_second() -> None:
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    done = call("--help")
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    assert done.returncode == 0
+    for command in COMMANDS:
+        assert command in done.stdout
+    assert after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime < 1
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_help_with_an_example(
+    command: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["mlflow", "sync", "--help"] if command == "mlflow" else [command, "--help"]
+    with pytest.raises(SystemExit) as ended:
+        cli.main(words)
+    assert ended.value.code in (0, None)
+    assert "Example:" in capsys.readouterr().out
+
+
+def test_heavy_packages_are_not_imported_for_help() -> None:
+    code = "import sys, guided_lgp.cli; print(*sys.modules)"
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], text=True, capture_output=True, check=True
+    )
+    heavy = {"numpy", "torch", "lightning", "mlflow", "pandas", "pybullet", "casadi"}
+    assert heavy.isdisjoint(loaded.stdout.split())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["plant"], "No such command 'plant'."),
+        (["train_policy", "swim"], "'swim' is not one of 'instruction', 'grasp', 'place'"),
+        (["plan", str(SCENE)], "Missing option '--goal'"),
+        (["plan", str(SCENE), "--goal", "(on red green)", "--planner", "fast"], "'fast' is not"),
+        (["plan", str(SCENE), "--goal", "(on red)"], "goal '(on red)': is not a goal"),
+        (["plan", str(SCENE), "--goal", "(on red sink)"], "unknown table 'sink'"),
+        (["plan", str(SCENE), "--goal", "(held pink)"], "unknown box 'pink'"),
+        (["plan", str(SCENE), "--goal", "(on red tab1)"], "already holds"),
+        (["plan", "none.json", "--goal", "(held red)"], "none.json: No such file"),
+        (["generate_scenes", "--params", "none.yaml"], "none.yaml: No such file"),
+        (["mlflow", "ui", "--port", "0"], "--port"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_2(
+    capsys: pytest.CaptureFixture[str], arguments: list[str], message: str
+) -> None:
+    assert message in rejected(capsys, *arguments)
+
+
+def test_contradictory_goals(capsys: pytest.CaptureFixture[str]) -> None:
+    goals = ["--goal", "(on red tab2)", "--goal", "(held red)"]
+    assert "contradict" in rejected(capsys, "plan", str(SCENE), *goals)
+    goals = ["--goal", "(on red blue)", "--goal", "(on blue red)"]
+    assert "cycle" in rejected(capsys, "plan", str(SCENE), *goals)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"boxes": []}, "boxes"),
+        ({"colour": "blue"}, "colour"),
+        ({"robot": {"model": "pr2", "torso": 2}}, "robot.torso"),
+        ({"tables": [{"name": "tab1", "position": [0, 0], "half_extents": [1, 1]}]}, "tables.0"),
+    ],
+)
+def test_faulty_scenes_name_file_and_field(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], changes: dict[str, Any], message: str
+) -> None:
+    file = edited(tmp_path, **changes)
+    text = rejected(capsys, "plan", str(file), "--goal", "(held red)")
+    assert text.startswith(f"{file}: {message}")
+
+
+def test_a_scene_that_is_not_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "scene.json"
+    file.write_text("{")
+    assert "is not JSON" in rejected(capsys, "plan", str(file), "--goal", "(held red)")
+
+
+def test_a_floating_box(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    boxes = json.loads(SCENE.read_text())["boxes"]
+    boxes[0]["position"][2] += 0.1
+    file = edited(tmp_path, boxes=boxes)
+    text = rejected(capsys, "plan", str(file), "--goal", "(held red)")
+    assert text.startswith(str(file))
+    assert "red" in text
+
+
+def test_missing_models_name_the_stage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    goal = ["--goal", "(held red)", "--models", str(tmp_path)]
+    assert "train_policy" in rejected(capsys, "plan", str(SCENE), *goal)
+
+
+def test_impossible_parameters_stop_a_stage(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    document = yaml.safe_load((ROOT / "params.yaml").read_text())
+    document["build_dataset"]["training_objectives"] = 99
+    file = tmp_path / "params.yaml"
+    file.write_text(yaml.safe_dump(document))
+    monkeypatch.chdir(tmp_path)
+    text = rejected(capsys, "build_dataset", "--params", str(file))
+    assert "build_dataset.training_objectives" in text
+    assert list(tmp_path.iterdir()) == [file]
+
+
+def test_debug_shows_the_traceback() -> None:
+    done = call("--debug", "plan", "none.json", "--goal", "(held red)")
+    assert "Traceback" in done.stderr
+    assert "InputError" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("error", "line"),
+    [
+        (WorkerError("enumerate: task 1 of 2 failed"), "error: enumerate: task 1 of 2 failed\n"),
+        (KeyError("x"), "error: internal error: KeyError: 'x'; --debug shows where\n"),
+    ],
+)
+def test_errors_of_the_program_end_with_3(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    error: Exception,
+    line: str,
+) -> None:
+    def fail() -> None:
+        raise error
+
+    monkeypatch.setattr("guided_lgp.doctor.examine", fail)
+    with pytest.raises(SystemExit) as ended:
+        cli.main(["doctor"])
+    assert ended.value.code == 3
+    assert capsys.readouterr().err == line
+
+
+def test_plan_writes_actions_and_a_replay(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page = tmp_path / "plan.html"
+    with pytest.raises(SystemExit) as ended:
+        cli.main([*PLAN, "--json", "--execute", "--html", str(page)])
+    assert not ended.value.code
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["solved"] is True
+    assert len(answer["actions"]) == 2
+    assert answer["actions"][-1].endswith("red green)")
+    assert answer["physics"]["success"] is True
+    assert page.stat().st_size > 100_000
+
+
+def test_no_plan_ends_with_1_and_says_why(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    document = yaml.safe_load((ROOT / "params.yaml").read_text())
+    document["compare_scalability"]["max_tree_size"] = 2
+    file = tmp_path / "params.yaml"
+    file.write_text(yaml.safe_dump(document))
+    with pytest.raises(SystemExit) as ended:
+        cli.main([*PLAN, "--params", str(file)])
+    assert ended.value.code == 1
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.startswith("no plan: stopped at the limit of the tree size")
+
+
+def test_doctor_says_how_to_mend(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        cli.main(["doctor", "--json"])
+    findings = {finding["name"]: finding for finding in json.loads(capsys.readouterr().out)}
+    assert findings["Python"]["ok"]
+    assert findings["Robot"]["ok"]
+    assert all(finding["ok"] or finding["mend"] for finding in findings.values())
+
+
+def test_the_python_interface_from_the_documentation() -> None:
+    done = subprocess.run(
+        [sys.executable, str(ROOT / "examples" / "plan.py")],
+        text=True,
+        capture_output=True,
+        check=True,
+        timeout=120,
+    )
+    assert done.stdout.startswith("(grasp")
