@@ -29,6 +29,8 @@ LIFT = 0.08
 SIDES = {"pr2L": 1.0, "pr2R": -1.0}
 _ZERO = -1
 """Slot of the constant 0."""
+_TOUCH = 0.002
+"""Heights (m) that differ by less are one."""
 _PAD_MARGIN = 0.01
 _PRESENTED = (0.55, 0.0, 0.95)
 """Where a held box is offered as a support, in the robot's frame: the start of the search (m)."""
@@ -269,6 +271,7 @@ class Formulator:
         self._modes: list[Mode] = []
         self._steps: list[list[Mode | Placement | Separation | Posture]] = []
         self._balanced: set[tuple[object, ...]] = set()
+        self._separated: set[frozenset[tuple[int, int, int]]] = set()
         self._action = 0
         self._state: State = geometry.scene.state
         self._level: dict[str, Level] = {
@@ -309,13 +312,15 @@ class Formulator:
         self._avoid(posture, excluded=(box,))
         self._held[box] = mode
         carried = self._state.carried_by(box)
+        support = self._state.support_of(box)
+        assert support is not None
+        self._separate((box, *carried), support)
         if carried:
             for name in (box, *carried):
                 self._level[name] = self._level[name].raised(LIFT)
             lifted = self._posture(mode, self._level[box], ())
             self._avoid(lifted, excluded=(box,))
             self._joints[gripper] = lifted.joints
-        support = self._state.support_of(box)
         if support in self._geometry.boxes:
             rest = successor(self._state, action)
             self._balance(rest, support)
@@ -526,27 +531,26 @@ class Formulator:
         self._balance(state, support)
 
     def _separate(self, moved: tuple[str, ...], support: str) -> None:
-        """What is put down overlaps no box or table of the same height."""
-        still = (*self._geometry.boxes, *self._geometry.tables)
+        """Boxes that come down from above, or go up, pass beside all that reaches as high."""
         for name in moved:
-            for other in still:
-                if other in moved or other == support:
-                    continue
+            for other in (*self._geometry.boxes, *self._geometry.tables):
                 held = self._held.get(other)
-                if held is not None and held.gripper not in self._joints:
+                at_side = held is not None and held.gripper not in self._joints
+                if other in moved or other == support or at_side:
                     continue
-                if self._same_height(name, other):
+                first, second = self._level[name], self._level[other]
+                bottom = first.offset - self._geometry.bodies[name].half[2]
+                top = second.offset + self._geometry.bodies[other].half[2]
+                variable = any(slot >= 0 for slot in (*first.plane, *second.plane))
+                if variable and first.z == second.z and top > bottom + _TOUCH:
                     self._beside(name, other)
-
-    def _same_height(self, name: str, other: str) -> bool:
-        first, second = self._level[name], self._level[other]
-        if first.z != second.z:
-            return False
-        halves = (self._geometry.bodies[n].half[2] for n in (name, other))
-        return abs(first.offset - second.offset) < sum(halves) - 0.002
 
     def _beside(self, name: str, other: str) -> None:
         first, second = self._level[name], self._level[other]
+        pair = frozenset((first.plane, second.plane))
+        if pair in self._separated:
+            return
+        self._separated.add(pair)
         angle = self._variable(-4 * np.pi, 4 * np.pi, 1e-6, 0.0)
         halves = (*self._geometry.bodies[name].half[:2], *self._geometry.bodies[other].half[:2])
         self._instance(
