@@ -277,7 +277,7 @@ class _Phase:
         for box, (gripper, grip) in self._grips.items():
             corners = apply(grip, np.array(sizes[box]) / 2 * _CORNERS)
             reach[gripper] = max(reach[gripper], float(np.linalg.norm(corners, axis=1).max()))
-        self.q, self.times = _subdivide(q, times, [reach[gripper] for gripper in GRIPPERS])
+        self.q, self.times = _resample(q, times, [reach[gripper] for gripper in GRIPPERS])
         self._tools = pr2.tool_poses(scene, self.q[:, :14])
         self._moving = {
             box: compose(self._tools[gripper], grip) for box, (gripper, grip) in self._grips.items()
@@ -320,8 +320,8 @@ class _Phase:
         return None
 
 
-def _subdivide(q: Array, times: Array, reach: Sequence[float]) -> tuple[Array, Array]:
-    """Interpolate samples (T, 22) so that no point moves more than ``STEP`` between two.
+def _resample(q: Array, times: Array, reach: Sequence[float]) -> tuple[Array, Array]:
+    """Walk along samples (T, 22) so that no point moves more than ``STEP`` between two.
 
     ``reach`` is how far (m) what each hand holds extends beyond its tool frame. A point moves by
     at most the sum over the joints of lever times angle.
@@ -331,10 +331,9 @@ def _subdivide(q: Array, times: Array, reach: Sequence[float]) -> tuple[Array, A
         turns[:, arm] @ (pr2.LEVER[arm] + beyond) + _FINGER_LEVER * turns[:, 14:].max(axis=1)
         for arm, beyond in zip(map(pr2.arm_slice, GRIPPERS), reach, strict=True)
     ]
-    pieces = np.maximum(1, np.ceil(np.max(ways, axis=0) / STEP)).astype(int)
-    rows = np.repeat(np.arange(len(pieces)), pieces)
-    within = np.arange(len(rows)) - np.repeat(np.cumsum(pieces) - pieces, pieces) + 1
-    share = within / pieces[rows]
-    fine = q[rows] + share[:, None] * (q[rows + 1] - q[rows])
-    moments = times[rows] + share * (times[rows + 1] - times[rows])
-    return np.vstack([q[:1], fine]), np.r_[times[:1], moments]
+    way = np.r_[0.0, np.cumsum(np.max(ways, axis=0))]
+    marks = np.linspace(0.0, way[-1], int(np.ceil(way[-1] / STEP)) + 1)
+    columns = [np.interp(marks, way, column) for column in (*q.T, times)]
+    fine = np.stack(columns, axis=1)
+    fine[0], fine[-1] = np.r_[q[0], times[0]], np.r_[q[-1], times[-1]]
+    return fine[:, :-1], fine[:, -1]
