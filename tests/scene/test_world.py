@@ -1,5 +1,6 @@
 """The PyBullet world: what it finds does not depend on what was asked before."""
 
+import gc
 from collections.abc import Iterator
 
 import numpy as np
@@ -70,6 +71,14 @@ def test_clients_are_freed() -> None:
             client = world.client
         assert not pybullet.isConnected(client)
     assert len(clients) == 1
+
+
+def test_a_forgotten_world_is_freed() -> None:
+    world = World(generate("a", 1, 1, "x").scenes[0])
+    client = world.client
+    del world
+    gc.collect()
+    assert not pybullet.isConnected(client)
 
 
 def test_close_twice(world: World) -> None:
