@@ -22,7 +22,8 @@ class Policy(Protocol):
         Args:
             objective: the goals to reach, as the search encodes them (adapted or not).
             state: the symbolic state, for the choice of slots.
-            positions: world position (3,) in m of every symbol.
+            positions: world position (3,) in m of every symbol, as declared: the order of the boxes
+                and of the surfaces decides about the slots of a policy that has slots.
             actions: the applicable children, at least one.
 
         Returns:
