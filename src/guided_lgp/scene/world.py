@@ -269,7 +269,9 @@ class World:
         for link, index in self.links.items():
             dark = any(part in link for part in ("finger", "wrist", "elbow", "head", "laser"))
             colour = (0.32, 0.33, 0.36, 1.0) if dark else (0.84, 0.84, 0.82, 1.0)
-            pybullet.changeVisualShape(robot, index, rgbaColor=colour, physicsClientId=self.client)
+            pybullet.changeVisualShape(
+                self.robot, index, rgbaColor=colour, physicsClientId=self.client
+            )
         self._add_decoration((9.0, 9.0, 0.005), (0.0, 0.0, -0.005), _FLOOR)
         for table in self.scene.tables:
             x, y, z = table.position
