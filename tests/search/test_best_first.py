@@ -93,3 +93,13 @@ def test_a_policy_that_goes_in_circles(scene: Scene) -> None:
     )
     assert result.solved
     assert result.tree_size < 500
+
+
+def test_ends_after_so_many_sequences_without_a_path(scene: Scene, limits: SearchLimits) -> None:
+    bounds = ScriptedBounds(scene, path=lambda skeleton: False)
+    limits = limits.model_copy(update={"max_paths": 5})
+    result = best_first.plan(
+        scene, parse_objective(["(held red)"]), scene.symbols, bounds, UNIFORM, limits
+    )
+    assert (result.reason, result.path_calls) == ("paths", 5)
+    assert "limit of sequences without a path" in result.explanation
