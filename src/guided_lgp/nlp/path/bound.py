@@ -1,7 +1,6 @@
 """The path bound P(a_1:K): the dense motion for a whole skeleton (paper, eq. 4)."""
 
 import time
-import weakref
 from itertools import chain, islice
 
 from guided_lgp.nlp.coarse import CoarseBound
@@ -43,7 +42,6 @@ class PathBound:
         self._mover = Mover(scene, _ITERATIONS)
         self._grips = {box.name: grips_of(box) for box in scene.boxes}
         self._world = World(scene)
-        weakref.finalize(self, self._world.close)
 
     def solve(self, coarse_result: CoarseResult) -> PathResult:
         """Find a verified motion.
