@@ -38,6 +38,7 @@ _OTHER_BOX, _OTHER_TABLE = (0.25, 0.65, 0.68), (0.78, 0.66, 0.50)
 _LEGS, _FLOOR = (0.45, 0.42, 0.40), (0.93, 0.94, 0.95)
 _BOX_DENSITY = 400.0
 _FRICTION = 0.8
+_SPINNING_FRICTION = 0.01  # m: faces that touch resist turning, their contact points alone do not
 
 
 @dataclass(frozen=True, order=True)
@@ -261,7 +262,13 @@ class World:
             placement[3:],
             physicsClientId=self.client,
         )
-        pybullet.changeDynamics(body, -1, lateralFriction=_FRICTION, physicsClientId=self.client)
+        pybullet.changeDynamics(
+            body,
+            -1,
+            lateralFriction=_FRICTION,
+            spinningFriction=_SPINNING_FRICTION,
+            physicsClientId=self.client,
+        )
         return body
 
     def _dress(self) -> None:
