@@ -126,6 +126,10 @@ def test_faulty_scenes_name_file_and_field(
     assert text.startswith(f"{file}: {message}")
 
 
+def test_output_in_a_missing_folder(capsys: pytest.CaptureFixture[str]) -> None:
+    assert "folder does not exist" in rejected(capsys, *PLAN, "--out", "nowhere/plan.json")
+
+
 def test_a_scene_that_is_not_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "scene.json"
     file.write_text("{")
@@ -191,9 +195,9 @@ def test_errors_of_the_program_end_with_3(
 def test_plan_writes_actions_and_a_replay(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    page = tmp_path / "plan.html"
+    page, file = tmp_path / "plan.html", tmp_path / "plan.json"
     with pytest.raises(SystemExit) as ended:
-        cli.main([*PLAN, "--json", "--execute", "--html", str(page)])
+        cli.main([*PLAN, "--json", "--execute", "--html", str(page), "--out", str(file)])
     assert not ended.value.code
     answer = json.loads(capsys.readouterr().out)
     assert answer["solved"] is True
@@ -201,6 +205,11 @@ def test_plan_writes_actions_and_a_replay(
     assert answer["actions"][-1].endswith("red green)")
     assert answer["physics"]["success"] is True
     assert page.stat().st_size > 100_000
+    plan = json.loads(file.read_text())
+    assert plan["actions"] == answer["actions"]
+    assert plan["objective"] == ["(on red green)"]
+    assert plan["physics"]["success"] is True
+    assert {"tree_size", "attempts", "time_s"} <= set(plan["statistics"])
 
 
 def test_no_plan_ends_with_1_and_says_why(

@@ -102,6 +102,7 @@ def plan(
         ),
     ],
     planner: Annotated[Planner, typer.Option(help="How to search.")] = Planner.GUIDED,
+    out: Annotated[Path | None, typer.Option(help="Write the plan as JSON.")] = None,
     html: Annotated[
         Path | None, typer.Option(help="Write the motion as a 3D page for the browser.")
     ] = None,
@@ -123,6 +124,9 @@ def plan(
     from guided_lgp.planning import plan as search
     from guided_lgp.scene import load_scene
 
+    for file in filter(None, (out, html)):
+        if not file.parent.is_dir():
+            raise InputError(str(file), "its folder does not exist", "a file in an existing folder")
     start = load_scene(scene)
     objective = parse_objective(goal)
     with _spinner("planning"):
@@ -135,12 +139,17 @@ def plan(
             where=str(scene),
         )
     times = {name: round(value, 3) for name, value in asdict(result.times).items()}
+    statistics = {
+        "planner": planner.value,
+        "tree_size": result.tree_size,
+        "attempts": 1 + sum(result.reattempts.values()),
+        "time_s": times,
+    }
     summary = {
         "solved": result.solved,
         "actions": [str(action) for action in result.skeleton or ()],
         "explanation": result.explanation,
-        "tree_size": result.tree_size,
-        "time_s": times,
+        "statistics": statistics,
     }
     path = result.path
     if path is None or path.trajectory is None:
@@ -153,8 +162,12 @@ def plan(
         from guided_lgp.nlp.physics import execute as simulate
 
         with _spinner("executing"):
-            physics = simulate(start, objective, path.skeleton, path.trajectory)
-        summary["physics"] = asdict(physics)
+            physics = asdict(simulate(start, objective, path.skeleton, path.trajectory))
+        summary["physics"] = physics
+    if out:
+        from guided_lgp.nlp.plan_file import write_plan
+
+        write_plan(out, start, objective, path, statistics, physics)
     if html:
         from guided_lgp.report.replay import replay_html
 
@@ -167,28 +180,35 @@ def plan(
         typer.echo(f"{number:2d}  {action}")
     typer.echo(f"motion of {path.trajectory.times[-1]:.1f} s, found in {sum(times.values()):.1f} s")
     if physics is not None:
-        outcome = (
-            "all goals hold" if physics.success else f"failed: {physics.fault or physics.goals}"
-        )
-        typer.echo(f"physics: {outcome}")
+        fault = physics["fault"] or f"goals: {physics['goals']}"
+        typer.echo(f"physics: {'all goals hold' if physics['success'] else fault}")
+    for file in filter(None, (out, html)):
+        typer.echo(f"written: {file}")
 
 
 @app.command()
 def view(
-    scene: Annotated[Path, typer.Argument(help="Scene to show, a JSON file.")],
+    file: Annotated[Path, typer.Argument(help="Scene, or plan written by plan --out: JSON.")],
     port: Annotated[int, typer.Option(help="TCP port on 127.0.0.1.", min=1, max=65535)] = 8080,
 ) -> None:
-    """Show a scene in the browser, on this machine only, until interrupted.
+    """Show a scene, or a plan in motion, in the browser of this machine, until interrupted.
 
     Example: guided-lgp view examples/three_boxes.json
     """
+    from guided_lgp.nlp.plan_file import read_plan
     from guided_lgp.report.live import view as serve
     from guided_lgp.scene import load_scene
     from guided_lgp.scene.validate import validate_scene
 
-    shown = load_scene(scene)
-    validate_scene(shown, str(scene))
-    serve(shown, port=port, announce=lambda address: typer.echo(f"{address} (Ctrl-C ends it)"))
+    found = read_plan(file) if _is_plan(file) else None
+    scene = found.scene if found else load_scene(file)
+    validate_scene(scene, str(file))
+    serve(
+        scene,
+        found.trajectory if found else None,
+        port,
+        announce=lambda address: typer.echo(f"{address} (Ctrl-C ends it)"),
+    )
 
 
 @app.command("generate_scenes")
@@ -297,6 +317,14 @@ def _run_stage(stage: str, params_file: Path, *arguments: str) -> None:
     module = import_module(STAGES[stage])
     with tracking.recorded("@".join([stage, *arguments]), params):
         module.run(params, Path.cwd(), *arguments)
+
+
+def _is_plan(file: Path) -> bool:
+    """Whether a file is a plan; a file that cannot be read is left to the reader of scenes."""
+    try:
+        return "actions" in json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError, TypeError):
+        return False
 
 
 @contextmanager
