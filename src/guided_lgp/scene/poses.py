@@ -66,14 +66,6 @@ def tilt(transform: Array) -> Array:
     return np.asarray(np.arctan2(np.hypot(z_axis[..., 0], z_axis[..., 1]), z_axis[..., 2]))
 
 
-def angle_between(first: Array, second: Array) -> Array:
-    """Angle (rad) of the rotation between two poses."""
-    relative = multiply(inverse(first)[..., 3:], second[..., 3:])
-    return np.asarray(
-        2.0 * np.arctan2(np.linalg.norm(relative[..., :3], axis=-1), np.abs(relative[..., 3]))
-    )
-
-
 def _cross(first: Array, second: Array) -> Array:
     """Cross product of vectors (..., 3): ``numpy.cross`` without its overhead."""
     a, b, c = first[..., 0], first[..., 1], first[..., 2]

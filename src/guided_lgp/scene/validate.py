@@ -7,8 +7,8 @@ import numpy as np
 from guided_lgp.errors import InputError
 from guided_lgp.scene import pr2
 from guided_lgp.scene.footprints import footprint, gap, inset
-from guided_lgp.scene.model import GRIPPERS, Box, Scene, Table
-from guided_lgp.scene.reach import reachable
+from guided_lgp.scene.model import Box, Scene, Table
+from guided_lgp.scene.reach import reachable_by_any
 from guided_lgp.scene.world import TABLE_THICKNESS, World
 
 FLOAT_TOLERANCE = 0.002
@@ -40,7 +40,7 @@ def validate_scene(scene: Scene, where: str = "scene") -> None:
         _validate_box(scene, box, f"{where}: boxes.{index} ({box.name})")
     _validate_overlaps(scene, where)
     for index, box in enumerate(scene.boxes):
-        if not any(reachable(scene, box, gripper) for gripper in GRIPPERS):
+        if not reachable_by_any(scene, box):
             raise InputError(
                 f"{where}: boxes.{index} ({box.name})",
                 f"out of both arms' reach at {box.position}",
