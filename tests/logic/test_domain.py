@@ -1,6 +1,8 @@
 """Level sizes of the logic tree and the permissive rules (DESIGN §2)."""
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from guided_lgp.errors import InputError
 from guided_lgp.logic import (
@@ -12,6 +14,7 @@ from guided_lgp.logic import (
     format_skeleton,
     parse_skeleton,
     progress,
+    successor,
 )
 
 SETUP_A = Symbols(("pr2L", "pr2R"), ("red", "green", "blue"), ("tab1", "tab2"))
@@ -67,3 +70,19 @@ def test_skeletons_survive_writing_and_reading() -> None:
 def test_bad_actions_are_named(text: str) -> None:
     with pytest.raises(InputError, match="is not an action"):
         Action.parse(text)
+
+
+@given(st.lists(st.integers(min_value=0), max_size=30))
+def test_invariants_along_random_sequences(choices: list[int]) -> None:
+    """Every box is held or stands, a gripper holds one box, and no box carries itself."""
+    state = ON_TAB1
+    for choice in choices:
+        actions = list(applicable_actions(state, SETUP_A))
+        assert len(set(actions)) == len(actions) > 0
+        state = successor(state, actions[choice % len(actions)])
+        standing, held = dict(state.support), dict(state.held)
+        assert sorted([*standing, *held]) == sorted(SETUP_A.boxes)
+        assert len(set(held.values())) == len(held)
+        for box in SETUP_A.boxes:
+            assert box not in state.carried_by(box)
+        assert State.of(standing, held) == state
