@@ -30,12 +30,18 @@ stages:
     params: [generate_scenes]
     outs:
       - data
+      - reports/report.md:
+          cache: false
       - reports/training/place.json:
           cache: false
 """
 WRITE = f"""
 from pathlib import Path
-for path, text in [("data/x", "1"), ("reports/training/place.json", {json.dumps(METRICS)!r})]:
+for path, text in [
+    ("data/x", "1"),
+    ("reports/report.md", "# Report"),
+    ("reports/training/place.json", {json.dumps(METRICS)!r}),
+]:
     Path(path).parent.mkdir(parents=True, exist_ok=True)
     Path(path).write_text(text)
 """
@@ -123,8 +129,9 @@ def test_metrics_curves_and_files_are_recorded(clone: Path) -> None:
     client = tracking.prepare()
     curve = client.get_metric_history(child.info.run_id, "loss.training")
     assert [(point.step, point.value) for point in curve] == [(0, 2.0), (1, 1.0), (2, 0.5)]
-    files = [item.path for item in client.list_artifacts(child.info.run_id, "training")]
-    assert files == ["training/place.json"]
+    listings = [client.list_artifacts(child.info.run_id, folder) for folder in (None, "training")]
+    files = [item.path for listing in listings for item in listing]
+    assert files == ["report.md", "training", "training/place.json"]
 
 
 def test_networks_can_be_loaded_from_mlflow(

@@ -173,7 +173,8 @@ class _Run:
         for file in reports:
             if file.suffix == ".json":
                 _log_metrics(self._client, self._id, _read_metrics(file))
-            self._client.log_artifact(self._id, str(file), str(file.parent.relative_to("reports")))
+            folder = file.parent.relative_to("reports")
+            self._client.log_artifact(self._id, str(file), str(folder) if folder.name else None)
         self._log_models([path for path in outputs if path.suffix == ".safetensors"])
         read = [file for path in stage.dependencies for file in _files(Path(path))]
         for file in [*read, *reports]:

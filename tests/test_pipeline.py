@@ -1,0 +1,209 @@
+"""The pipeline: its declaration, and its small profile end to end through DVC."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import grimp
+import pytest
+import yaml
+
+from guided_lgp.cli import STAGES
+from guided_lgp.params import Params, load_params
+
+ROOT = Path(__file__).parents[1]
+INFRASTRUCTURE = {"guided_lgp"} | {
+    f"guided_lgp.{name}" for name in ("errors", "parallel", "params", "paths")
+}
+"""Modules that do not determine a stage's results: fan-out, messages, places."""
+UNUSED = {"enumerate_sequences": {"guided_lgp.nlp.path"}}
+"""What a stage imports without calling it: the enumeration asks for coarse verdicts only."""
+
+
+def pipeline() -> dict[str, Any]:
+    document: dict[str, Any] = yaml.safe_load((ROOT / "dvc.yaml").read_text())
+    return document
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_a_stage_depends_on_its_script_and_its_sources(stage: str) -> None:
+    deps = pipeline()["stages"][stage]["deps"]
+    assert f"stages/{stage}.py" in deps
+    graph = grimp.build_graph("guided_lgp", exclude_type_checking_imports=True)
+    modules = {STAGES[stage]} | graph.find_upstream_modules(STAGES[stage])
+    for module in sorted(modules - INFRASTRUCTURE):
+        if any(module.startswith(unused) for unused in UNUSED.get(stage, ())):
+            continue
+        file = Path("src", *module.split(".")).with_suffix(".py")
+        if (ROOT / file).is_file():
+            assert {str(path) for path in (file, *file.parents)} & set(deps), f"{stage}: {file}"
+
+
+def test_every_dependency_exists_or_is_made_by_a_stage() -> None:
+    stages = pipeline()["stages"]
+    networks = stages["train_policy"]["matrix"]["network"]
+    made = set()
+    for stage in stages.values():
+        for out in stage["outs"]:
+            name = out if isinstance(out, str) else next(iter(out))
+            made |= {name.replace("${item.network}", network) for network in networks}
+    for stage in stages.values():
+        for dependency in stage["deps"]:
+            assert dependency in made or (ROOT / dependency).exists(), dependency
+
+
+def test_stages_read_declared_parameters_only() -> None:
+    sections = {name for name in Params.model_fields if name not in ("parallel", "bounds")}
+    assert sections < set(pipeline()["stages"])
+    assert list(STAGES) == list(pipeline()["stages"])
+
+
+def test_the_small_profile_has_the_same_keys() -> None:
+    load_params(ROOT / "tests" / "params.yaml")
+
+
+class Clone:
+    """A temporary clone of the working tree with the small profile."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+        self._environment = {
+            name: value for name, value in os.environ.items() if not name.startswith("DVC_")
+        } | {"PATH": path, "OMP_NUM_THREADS": "1", "MLFLOW_TRACKING_URI": self.uri}
+        listing = self._run("git", "ls-files", "-co", "--exclude-standard", where=ROOT).stdout
+        for name in listing.splitlines():
+            if name.startswith("src/guided_lgp") or (ROOT / name).is_file():
+                (folder / name).parent.mkdir(parents=True, exist_ok=True)
+                shutil.copy(ROOT / name, folder / name)
+        shutil.copy(ROOT / "tests" / "params.yaml", folder / "params.yaml")
+        (folder / "dvc.lock").unlink(missing_ok=True)
+        self.git("init", "-q")
+        self.git("add", "-A")
+        self.git("-c", "user.name=test", "-c", "user.email=test@localhost", "commit", "-qm", "test")
+
+    @property
+    def uri(self) -> str:
+        return f"sqlite:///{self.folder / 'mlflow.db'}"
+
+    def git(self, *arguments: str) -> None:
+        self._run("git", *arguments)
+
+    def dvc(self, *arguments: str) -> str:
+        done = self._run("dvc", *arguments)
+        assert done.returncode == 0, done.stdout + done.stderr
+        return done.stdout + done.stderr
+
+    def run(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+        return self._run(sys.executable, *arguments)
+
+    def lock(self) -> dict[str, Any]:
+        stages: dict[str, Any] = yaml.safe_load((self.folder / "dvc.lock").read_text())["stages"]
+        return stages
+
+    def _run(self, *command: str, where: Path | None = None) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            command,
+            cwd=where or self.folder,
+            env=self._environment,
+            text=True,
+            capture_output=True,
+            stdin=subprocess.DEVNULL,
+            check=False,
+        )
+
+
+@pytest.fixture(scope="module")
+def clone(tmp_path_factory: pytest.TempPathFactory) -> Clone:
+    """The small profile after one run of the whole pipeline."""
+    clone = Clone(tmp_path_factory.mktemp("clone"))
+    output = clone.dvc("repro")
+    assert "MLflow: not recorded" not in output
+    return clone
+
+
+@pytest.mark.pipeline
+class TestSmallProfile:
+    """In the order of a user's day: run, look, change a parameter, make a mistake."""
+
+    def test_a_run_writes_models_metrics_and_reports(self, clone: Clone) -> None:
+        reports = clone.folder / "reports"
+        metrics = {
+            name: json.loads((reports / "metrics" / f"{name}.json").read_text())
+            for name in ("generalization", "scalability", "scalability_timing", "training")
+        }
+        shares = metrics["generalization"]["adaptation"]["all"]
+        assert 0 < shares["n"] <= 87
+        assert sum(shares[key] for key in ("shortest", "feasible", "no_solution")) == (
+            pytest.approx(1)
+        )
+        assert metrics["scalability"]["a.1"]["breadth_first"]["objectives"] == 9
+        assert metrics["scalability_timing"]["a.1"]["guided"]["peak_rss_mb"] > 0
+        assert set(metrics["training"]) >= {"instruction", "grasp", "place"}
+        for network in ("instruction", "grasp", "place"):
+            assert (clone.folder / "models" / f"{network}.safetensors").stat().st_size > 1000
+        page = (reports / "report.md").read_text()
+        assert "Table I" in page
+        assert "Table III" in page
+
+    def test_a_second_run_does_nothing_within_seconds(self, clone: Clone) -> None:
+        start = time.monotonic()
+        output = clone.dvc("repro")
+        assert "Running stage" not in output
+        assert time.monotonic() - start < 20
+        assert "up to date" in clone.dvc("status")
+
+    def test_mlflow_has_a_child_per_stage_and_sync_adds_nothing(self, clone: Clone) -> None:
+        from mlflow import MlflowClient
+
+        client = MlflowClient(clone.uri)
+        experiment = client.get_experiment_by_name("guided-lgp")
+        assert experiment is not None
+        runs = client.search_runs([experiment.experiment_id])
+        parents = [run for run in runs if "mlflow.parentRunId" not in run.data.tags]
+        assert len(parents) == 1
+        assert "generalization.default.all.shortest" in parents[0].data.metrics
+        children = [run for run in runs if run not in parents]
+        assert {run.info.status for run in runs} == {"FINISHED"}
+        stages = list(clone.lock())
+        assert sorted(run.data.tags["guided_lgp.stage"] for run in children) == sorted(stages)
+        synced = clone.run("-m", "guided_lgp.cli", "mlflow", "sync")
+        assert "recorded 0 stages" in synced.stdout, synced.stderr
+        assert len(client.search_runs([experiment.experiment_id])) == len(runs)
+
+    def test_metrics_plots_and_graph_can_be_shown(self, clone: Clone) -> None:
+        assert "generalization.json" in clone.dvc("metrics", "show")
+        assert "index.html" in clone.dvc("plots", "show")
+        assert "train_policy@place" in clone.dvc("dag")
+
+    def test_an_experiment_reruns_only_what_depends_on_it(self, clone: Clone) -> None:
+        before = clone.lock()
+        output = clone.dvc("exp", "run", "-S", "train_policy.place.dropout=0.3", "train_policy")
+        assert "Running stage 'train_policy@place'" in output
+        assert output.count("Running stage") == 1
+        after = clone.lock()
+        assert [name for name in after if after[name] != before[name]] == ["train_policy@place"]
+        assert "evaluate_generalization" in clone.dvc("status")
+
+    def test_bad_parameters_stop_a_stage_before_it_computes(self, clone: Clone) -> None:
+        file = clone.folder / "params.yaml"
+        good = file.read_text()
+        file.write_text(good.replace("max_length: 2", "max_length: two"))
+        try:
+            done = clone.run("stages/enumerate_sequences.py")
+        finally:
+            file.write_text(good)
+        assert done.returncode == 2
+        assert done.stderr.count("\n") == 1
+        assert "params.yaml: enumerate_sequences.max_length" in done.stderr
+
+    def test_a_missing_input_names_the_stage_that_makes_it(self, clone: Clone) -> None:
+        (clone.folder / "data" / "scenes" / "training.json").unlink()
+        done = clone.run("stages/build_dataset.py")
+        assert done.returncode == 2
+        assert "generate_scenes" in done.stderr
