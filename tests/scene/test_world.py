@@ -59,7 +59,7 @@ def test_fingers_are_set(world: World) -> None:
     world.set(pr2.HOME_CONFIGURATION, {}, {"pr2L": pr2.finger_joint(0.03)})
     tips = {g: [link for link in pr2.HAND_LINKS[g] if "tip" in link] for g in GRIPPERS}
     assert world.distance(*tips["pr2L"]) == pytest.approx(0.03, abs=0.002)
-    assert world.distance(*tips["pr2R"]) == pytest.approx(0.09, abs=0.001)
+    assert world.distance(*tips["pr2R"]) == pytest.approx(pr2.MAX_OPENING, abs=0.002)
 
 
 def test_clients_are_freed() -> None:

@@ -140,6 +140,9 @@ def finger_joint(opening: float) -> float:
     return float(np.clip(np.arcsin(sine) - np.arctan2(_GAP_COSINE, _GAP_SINE), *FINGER_LIMITS))
 
 
+MAX_OPENING = finger_opening(FINGER_LIMITS[1])
+"""Widest distance of the fingertips (m): 9.0 cm."""
+
 GRASP_WIDTH = 0.085
 """Widest side (m) of a box that the fingers close across."""
 
