@@ -1,4 +1,5 @@
 import json
+from itertools import permutations
 from pathlib import Path
 
 import numpy as np
@@ -104,6 +105,31 @@ def test_variant_with_adapted_goals(
     variant = build(world, objectives, "adapted_goals")
     assert found_samples(variant) == expected_samples(world, objectives, 0, adapt=True)
     assert found_samples(variant) > found_samples(dataset)
+
+
+def test_variant_with_any_order_of_boxes(
+    world: Enumeration, objectives: list[Objective], dataset: Dataset
+) -> None:
+    variant = build(world, objectives, "any_order_of_boxes")
+    assert len(variant) == len(dataset)
+    remaining = expected_samples(world, objectives, slack=0)
+    symbols = variant.symbols
+    used = set()
+    for state, goals in zip(variant.sample_state, variant.sample_goals, strict=True):
+        for boxes in permutations(symbols.boxes):
+            order = [0, 1, *(2 + boxes.index(name) for name in symbols.boxes), 5, 6]
+            named = Symbols(symbols.grippers, boxes, symbols.surfaces)
+            sample = (
+                decode_goals(variant.goals[goals], named),
+                variant.states[state].reshape(7, 3)[order].tobytes(),
+                decode_action(variant.actions[state], named),
+            )
+            if sample in remaining:
+                remaining.remove(sample)
+                used.add(boxes)
+                break
+    assert not remaining, "every sample occurs, under one of the orders"
+    assert len(used) == 6
 
 
 def test_variant_with_one_order(

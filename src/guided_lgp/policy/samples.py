@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import permutations
 from pathlib import Path
 
 import numpy as np
@@ -40,6 +41,7 @@ def build_dataset(
     objectives: Sequence[Objective],
     slack: int,
     variant: Variant = VARIANTS["paper"],
+    seed: int = 0,
 ) -> Dataset:
     """Collect the samples of the training configurations and objectives.
 
@@ -54,6 +56,7 @@ def build_dataset(
         objectives: the training objectives.
         slack: extra actions.
         variant: what differs from the paper.
+        seed: of the order of the boxes, in a variant that draws it.
 
     Raises:
         InputError: a file is missing or does not fit the scenes; no sample results.
@@ -64,14 +67,19 @@ def build_dataset(
     verdicts = _read(sequences, ["configuration", "skeleton", "feasible", "states"])
     feasible = verdicts[verdicts["feasible"].astype(bool)]
     rows_of = {str(name): rows for name, rows in feasible.groupby("configuration")}
-    goals = _GoalCodes(objectives, encoding, encoding.fill((), scenes[0].state, symbols), variant)
+    goals = _GoalCodes(objectives, encoding, variant)
+    slots = [encoding.fill((), scenes[0].state, symbols)]
+    if variant.any_order_of_boxes:
+        slots = [replace(slots[0], boxes=boxes) for boxes in permutations(symbols.boxes)]
 
     states, actions, configuration = [], [], []
     sample_state, sample_goals = [], []
     first = 0
     for index, scene in enumerate(scenes):
         rows = rows_of.get(scene.name, feasible.iloc[:0])
-        paths = _feasible_sequences(scene, rows, symbols, encoding, str(sequences))
+        rng = np.random.default_rng(np.random.SeedSequence([seed, index]))
+        chosen = [slots[draw] for draw in rng.integers(len(slots), size=len(rows))]
+        paths = _feasible_sequences(scene, rows, chosen, encoding, str(sequences))
         wanted = _wanted(paths, objectives, lengths[index], slack)
         step, objective = np.nonzero(wanted[paths.sequence])
         codes = goals.rows(paths)[step, objective]
@@ -109,6 +117,8 @@ class _Sequences:
 
     progress: list[tuple[State, ...]]
     """Symbolic states 0 to K of each sequence."""
+    slots: list[Slots]
+    """The slots of each sequence."""
     sequence: IntArray
     """(M,) the sequence that each step belongs to."""
     states: FloatArray
@@ -118,9 +128,10 @@ class _Sequences:
 
 
 def _feasible_sequences(
-    scene: Scene, rows: pd.DataFrame, symbols: Symbols, encoding: Encoding, where: str
+    scene: Scene, rows: pd.DataFrame, slots: list[Slots], encoding: Encoding, where: str
 ) -> _Sequences:
-    slots = encoding.fill((), scene.state, symbols)
+    symbols = scene.symbols
+    stored = (*symbols.grippers, *symbols.boxes, *symbols.surfaces)
     known: dict[Skeleton, tuple[State, ...]] = {(): (scene.state,)}
 
     def progress(skeleton: Skeleton) -> tuple[State, ...]:
@@ -131,14 +142,21 @@ def _feasible_sequences(
 
     skeletons = [parse_skeleton(text) for text in rows["skeleton"]]
     states = [np.zeros((0, encoding.state_size), dtype=np.float32)]
-    for skeleton, flat in zip(skeletons, rows["states"], strict=True):
+    for skeleton, flat, own in zip(skeletons, rows["states"], slots, strict=True):
         size = (len(skeleton) + 1) * encoding.state_size
         if flat is None or len(flat) != size:
             raise InputError(where, f"states of {scene.name}: not {size} numbers", _ENUMERATION)
-        states.append(np.asarray(flat, np.float32).reshape(-1, encoding.state_size)[:-1])
-    classes = [encoding.encode_action(slots, action) for path in skeletons for action in path]
+        positions = np.asarray(flat, np.float32).reshape(-1, len(stored), 3)[:-1]
+        order = [stored.index(name) for name in own.symbols if name is not None]
+        states.append(positions[:, order].reshape(-1, encoding.state_size))
+    classes = [
+        encoding.encode_action(own, action)
+        for path, own in zip(skeletons, slots, strict=True)
+        for action in path
+    ]
     return _Sequences(
         progress=[progress(skeleton) for skeleton in skeletons],
+        slots=slots,
         sequence=np.repeat(np.arange(len(skeletons)), [len(path) for path in skeletons]),
         states=np.concatenate(states),
         actions=np.array(classes, dtype=np.int8).reshape(-1, 4),
@@ -165,44 +183,49 @@ class _GoalCodes:
     """The distinct encoded objectives, and which of them each sample has."""
 
     def __init__(
-        self, objectives: Sequence[Objective], encoding: Encoding, slots: Slots, variant: Variant
+        self, objectives: Sequence[Objective], encoding: Encoding, variant: Variant
     ) -> None:
         self.codes: list[FloatArray] = []
         self._objectives = objectives
         self._encoding = encoding
-        self._slots = slots
         self._variant = variant
-        self._row: dict[Objective, int] = {}
-        self._rows_in: dict[State, IntArray] = {}
+        self._row: dict[Slots, int] = {}
+        self._rows_in: dict[tuple[State, Slots], IntArray] = {}
 
     def rows(self, paths: _Sequences) -> IntArray:
         """(steps, objectives, 4) the rows in ``codes`` of each objective at each step.
 
         The last axis has the objective and the adapted objective, each in both orders, or -1.
         """
-        per_step = [self._rows(state) for path in paths.progress for state in path[:-1]]
+        per_step = [
+            self._rows(state, slots)
+            for path, slots in zip(paths.progress, paths.slots, strict=True)
+            for state in path[:-1]
+        ]
         return np.array(per_step, dtype=np.int64).reshape(-1, len(self._objectives), 4)
 
-    def _rows(self, state: State) -> IntArray:
-        if state not in self._rows_in:
-            rows = np.full((len(self._objectives), 4), _NONE)
-            for row, objective in zip(rows, self._objectives, strict=True):
-                row[:2] = self._orders(objective)
+    def _rows(self, state: State, slots: Slots) -> IntArray:
+        known = self._rows_in.get((state, slots))
+        if known is None:
+            known = np.full((len(self._objectives), 4), _NONE)
+            for row, objective in zip(known, self._objectives, strict=True):
+                row[:2] = self._orders(objective, slots)
                 remaining = unsatisfied(state, objective)
                 if self._variant.adapted_goals and remaining not in ((), objective):
-                    row[2:] = self._orders(remaining)
-            self._rows_in[state] = rows
-        return self._rows_in[state]
+                    row[2:] = self._orders(remaining, slots)
+            self._rows_in[state, slots] = known
+        return known
 
-    def _orders(self, goals: Objective) -> tuple[int, int]:
-        other = self._code(goals[::-1]) if self._variant.both_orders else _NONE
-        return self._code(goals), other
+    def _orders(self, goals: Objective, slots: Slots) -> tuple[int, int]:
+        reverse = goals[::-1]
+        other = self._code(replace(slots, goals=reverse)) if self._variant.both_orders else _NONE
+        return self._code(replace(slots, goals=goals)), other
 
-    def _code(self, goals: Objective) -> int:
-        if goals not in self._row:
-            self._row[goals] = len(self.codes)
-            self.codes.append(self._encoding.encode_goals(replace(self._slots, goals=goals)))
-        return self._row[goals]
+    def _code(self, slots: Slots) -> int:
+        if slots not in self._row:
+            self._row[slots] = len(self.codes)
+            self.codes.append(self._encoding.encode_goals(slots))
+        return self._row[slots]
 
 
 def _normalising(encoding: Encoding, states: FloatArray) -> Encoding:
