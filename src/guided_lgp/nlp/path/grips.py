@@ -7,7 +7,7 @@ import numpy as np
 
 from guided_lgp.nlp.results import Array
 from guided_lgp.scene import Box
-from guided_lgp.scene.pr2 import MAX_OPENING, PALM_FRONT, grasp_axis
+from guided_lgp.scene.pr2 import FINGER_LIMITS, PALM_FRONT, finger_opening, grasp_axis
 
 PALM_GAP = 0.002
 """Distance (m) of the palm's front from the box, at least."""
@@ -55,7 +55,7 @@ def grips_of(box: Box) -> tuple[Grips, Grips]:
     central: list[tuple[Array, Array]] = []
     others: list[tuple[Array, Array]] = []
     pitches = np.pi * np.arange(_PITCHES + 1) / _PITCHES
-    if 2 * half[across] > MAX_OPENING:
+    if 2 * half[across] > finger_opening(FINGER_LIMITS[1]):
         pitches = pitches[:0]
     for pitch, shift, back, flip in product(pitches, _SHIFTS, _DEPTHS, (1.0, -1.0)):
         approach = np.cos(pitch) * along - np.sin(pitch) * np.array([0.0, 0.0, 1.0])
