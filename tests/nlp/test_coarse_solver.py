@@ -12,7 +12,7 @@ from guided_lgp.nlp.coarse.formulation import Formulator, Margins, SceneGeometry
 from guided_lgp.nlp.coarse.kernels import Kernel, kernels
 from guided_lgp.nlp.coarse.solver import Compiled, Interpreter, Settings
 from guided_lgp.nlp.coarse.starts import Starts
-from guided_lgp.scene import generate
+from guided_lgp.scene import generate, pr2
 
 
 def _compiled() -> Compiled:
@@ -80,8 +80,8 @@ def test_the_library_is_compiled_once(monkeypatch: pytest.MonkeyPatch, tmp_path:
 
     assert compiler.load_library() is not None
     existing = next(compiler.cache_folder().glob("coarse-*.so"))
-    description = compiler.pr2.urdf_path()
-    monkeypatch.setattr(compiler.pr2, "urdf_path", lambda: description)
+    description = pr2.urdf_path()
+    monkeypatch.setattr(pr2, "urdf_path", lambda: description)
     monkeypatch.setattr(compiler, "_compile", pretend)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert compiler.load_library() is not None
@@ -93,8 +93,8 @@ def test_the_library_is_compiled_once(monkeypatch: pytest.MonkeyPatch, tmp_path:
 def test_without_a_compiler_the_interpreter_takes_over_and_says_so_once(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    description = compiler.pr2.urdf_path()
-    monkeypatch.setattr(compiler.pr2, "urdf_path", lambda: description)
+    description = pr2.urdf_path()
+    monkeypatch.setattr(pr2, "urdf_path", lambda: description)
     monkeypatch.setattr(compiler, "find_spec", lambda name: None)
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))

@@ -117,13 +117,13 @@ class CoarseBound:
         return CoarseSolution(skeleton, feasible=False, failure=failure, tries=self._tries)
 
     def _attempt(self, programs: "_Programs", attempt: int, known: Array | None) -> CoarseSolution:
-        """One start: the first continues the solution of the prefix, the others are drawn."""
+        """One start: the first and every other one keep the solution of the prefix."""
         formulation = programs[attempt]
         start = self._starts.draw(
             formulation,
             _generator(programs.skeleton, attempt),
             noise=0.0 if attempt == 0 else _NOISE,
-            known=known if attempt in _CONTINUING else None,
+            known=known if attempt == 0 or attempt % 2 else None,
         )
         solution = self._solver.solve(formulation.program, start, self._settings)
         return self._check(programs.skeleton, formulation, solution, attempt + 1)
@@ -177,11 +177,12 @@ class CoarseBound:
         return self._geometry.in_world(x, y, yaw, z)
 
 
-_MARGINS = (Margins(), Margins(clear=-0.002, beside=0.002))
-"""Comfortable ones, and close ones that only the verification limits; starts take turns."""
-
-_CONTINUING = (0, 2)
-"""Starts that keep the solution of the prefix."""
+_MARGINS = (
+    Margins(),
+    Margins(clear=0.0, arms=0.0, beside=0.003),
+    Margins(clear=-0.004, arms=-0.01, beside=0.003),
+)
+"""Comfortable ones, close ones, and such that only the verification limits: starts take turns."""
 
 
 class _Programs:

@@ -8,14 +8,12 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from hashlib import sha256
-from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 
 import casadi as ca
 
 from guided_lgp.nlp.coarse.kernels import kernels, reach
-from guided_lgp.scene import pr2
 
 _FLAGS = ("-O2", "-fPIC", "-shared", "-fno-math-errno")
 
@@ -56,23 +54,15 @@ def cache_folder() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "guided-lgp"
 
 
-def _digest() -> str:
-    """A name for all that the library depends on; cheaper than to generate the code."""
-    folder = Path(__file__).parent
-    sources = [folder / name for name in ("kinematics.py", "kernels.py", "compiler.py", "solver.c")]
-    content = sha256("\n".join((version("casadi"), sys.platform, *_FLAGS)).encode())
-    for source in (*sources, pr2.urdf_path()):
-        content.update(source.read_bytes())
-    return content.hexdigest()[:16]
-
-
 def load_library() -> ctypes.CDLL | None:
     """The compiled solver, or None if it is not there and no compiler works.
 
     The file's name depends on the content, and it is put in place atomically, so that several
     processes may compile at the same time.
     """
-    target = cache_folder() / f"coarse-{_digest()}.so"
+    source = _source()
+    digest = sha256("\n".join((source, sys.platform, *_FLAGS)).encode()).hexdigest()[:16]
+    target = cache_folder() / f"coarse-{digest}.so"
     if not target.exists():
         commands = list(_compilers())
         if not commands:
@@ -80,7 +70,7 @@ def load_library() -> ctypes.CDLL | None:
         target.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=target.parent) as folder:
             code, library = Path(folder) / "coarse.c", Path(folder) / "coarse.so"
-            code.write_text(_source(), encoding="utf-8")
+            code.write_text(source, encoding="utf-8")
             if not any(_compile(command, code, library) for command in commands):
                 return None
             library.replace(target)

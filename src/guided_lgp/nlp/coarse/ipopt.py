@@ -62,5 +62,5 @@ class Ipopt:
         equality = np.concatenate(
             [np.full(kernels()[k].rows, kernels()[k].equality) for k in program.kernel]
         )
-        worst = float(np.max(np.where(equality, np.abs(c), -c), initial=0.0))
+        worst = float(np.max(np.where(equality, np.abs(c), -c - self._settings.slack), initial=0.0))
         return Solution(everything, c, worst, int(self._solver.stats()["iter_count"]))

@@ -31,10 +31,11 @@ class Sphere:
 
 
 SPHERES: tuple[Sphere, ...] = (
+    Sphere("l_shoulder_pan_link", (0.13, -0.02, 0.0), 0.11),
     Sphere("l_upper_arm_link", (0.2, 0.0, 0.0), 0.08),
     Sphere("l_elbow_flex_link", (0.0, 0.0, 0.0), 0.085),
-    Sphere("l_forearm_link", (0.15, 0.0, 0.0), 0.075),
-    Sphere("l_forearm_link", (0.24, 0.0, -0.005), 0.062),
+    Sphere("l_forearm_link", (0.15, 0.0, 0.0), 0.08),
+    Sphere("l_forearm_link", (0.24, 0.0, -0.01), 0.068),
     Sphere("l_forearm_link", (0.325, 0.025, -0.005), 0.047),
     Sphere("l_forearm_link", (0.325, -0.025, -0.005), 0.047),
     Sphere("l_gripper_palm_link", (0.085, 0.025, 0.0), 0.036),
@@ -46,9 +47,9 @@ SPHERES: tuple[Sphere, ...] = (
     Sphere("l_gripper_palm_link", (0.168, 0.065, 0.0), 0.018),
     Sphere("l_gripper_palm_link", (0.168, -0.065, 0.0), 0.018),
 )
-"""Upper arm, elbow, forearm, wrist, palm and the two open fingers."""
+"""Shoulder, upper arm, elbow, forearm, wrist, palm and the two open fingers."""
 
-COARSE_SPHERES: tuple[int, ...] = (0, 1, 2, 3, 4, 5, 6, 7, 12, 13)
+COARSE_SPHERES: tuple[int, ...] = (0, 1, 2, 3, 4, 5, 6, 7, 8, 13, 14)
 """The spheres that stand for an arm against the other arm."""
 
 

@@ -25,7 +25,7 @@ typedef struct {
 } program;
 
 typedef struct {
-    double penalty, growth, largest_penalty, damping, tolerance;
+    double penalty, growth, largest_penalty, damping, tolerance, slack;
     int steps, inner, patience;
 } settings;
 
@@ -47,13 +47,14 @@ static void residuals(const program *nlp, const double *values, double *c)
     }
 }
 
-static double violation(const program *nlp, const double *c)
+/* Largest violation, where inequalities may be violated by `slack`. */
+static double violation(const program *nlp, const double *c, double slack)
 {
     double largest = 0;
     for (int i = 0; i < nlp->instances; i++) {
         int equality = kernel_table[nlp->kernel[i]].equality;
         for (int r = nlp->row_start[i]; r < nlp->row_start[i + 1]; r++) {
-            double v = equality ? fabs(c[r]) : -c[r];
+            double v = equality ? fabs(c[r]) : -c[r] - slack;
             if (!(v <= largest))
                 largest = v;
         }
@@ -200,7 +201,7 @@ int coarse_solve(const program *nlp, const settings *options, double *values, do
     skyline(nlp, first);
     memset(multiplier, 0, sizeof(double) * rows);
     residuals(nlp, values, c);
-    double worst = violation(nlp, c), best = worst;
+    double worst = violation(nlp, c, options->slack), best = worst;
     int improved = 0; /* step of the last good gain on the violation */
     while (worst > options->tolerance && tried < options->steps &&
            tried - improved < options->patience) {
@@ -240,7 +241,7 @@ int coarse_solve(const program *nlp, const settings *options, double *values, do
                         break;
                 }
             }
-            worst = violation(nlp, c);
+            worst = violation(nlp, c, options->slack);
             if (worst < 0.9 * best) {
                 best = worst;
                 improved = tried;

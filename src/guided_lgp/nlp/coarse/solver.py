@@ -66,6 +66,9 @@ class Settings:
     largest_penalty: float = 1e5
     damping: float = 0.1
     tolerance: float = 1e-3
+    """Largest violation of an equality, scaled."""
+    slack: float = 1e-2
+    """What an inequality may be violated by beyond the tolerance: its margin is larger."""
     steps: int = 200
     inner: int = 2
     patience: int = 25
@@ -81,7 +84,7 @@ class Solution:
     residuals: Array
     """(rows,), scaled."""
     violation: float
-    """Largest violation of a row, scaled."""
+    """Largest violation of a row, scaled; of an inequality, beyond the slack."""
     steps: int
 
     def converged(self, settings: Settings) -> bool:
@@ -127,7 +130,14 @@ class _CSettings(ctypes.Structure):
     _fields_ = (
         *(
             (name, ctypes.c_double)
-            for name in ("penalty", "growth", "largest_penalty", "damping", "tolerance")
+            for name in (
+                "penalty",
+                "growth",
+                "largest_penalty",
+                "damping",
+                "tolerance",
+                "slack",
+            )
         ),
         ("steps", ctypes.c_int),
         ("inner", ctypes.c_int),
@@ -176,6 +186,7 @@ class Compiled:
             settings.largest_penalty,
             settings.damping,
             settings.tolerance,
+            settings.slack,
             settings.steps,
             settings.inner,
             settings.patience,
@@ -210,7 +221,7 @@ class Interpreter:
         penalty, damping, tried = settings.penalty, settings.damping, 0
         multiplier = np.zeros(program.rows)
         c = self.residuals(program, values)
-        worst = best = _violation(c, equality)
+        worst = best = _violation(c, equality, settings.slack)
         improved = 0
         while (
             worst > settings.tolerance
@@ -242,7 +253,7 @@ class Interpreter:
                         damping *= 5
                         if damping > 1e8:
                             break
-                worst = _violation(c, equality)
+                worst = _violation(c, equality, settings.slack)
                 if worst < 0.9 * best:
                     best, improved = worst, tried
                 if worst <= settings.tolerance or not accepted or gain < 1e-2 * value:
@@ -302,8 +313,8 @@ class Interpreter:
         return g, H
 
 
-def _violation(c: Array, equality: NDArray[np.bool_]) -> float:
-    return float(max(0.0, np.max(np.where(equality, np.abs(c), -c), initial=0.0)))
+def _violation(c: Array, equality: NDArray[np.bool_], slack: float) -> float:
+    return float(np.max(np.where(equality, np.abs(c), -c - slack), initial=0.0))
 
 
 def _merit(
