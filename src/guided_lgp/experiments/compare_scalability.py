@@ -9,6 +9,7 @@ branching in b.1, c.1 and d.1; the guided ones never do.
 import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from statistics import fmean, pstdev
 from typing import Any
@@ -37,7 +38,7 @@ UNGUIDED: dict[str, Callable[..., SearchResult]] = {
 }
 GUIDED: dict[str, Callable[..., SearchResult]] = {
     "guided": guided.plan,
-    "guided_best_first": best_first.plan,
+    "guided_best_first": partial(best_first.plan, ordering="discrepancy"),
 }
 TIMES = ("symbolic", "policy", "coarse", "path")
 
@@ -154,7 +155,11 @@ def summarize(rows: Sequence[Row]) -> dict[str, dict[str, Row]]:
 
 
 def summarize_times(rows: Sequence[Row]) -> dict[str, dict[str, Row]]:
-    """Times (s) over the problems that each planner solved, and the peak memory over all."""
+    """Times (s) over the problems that each planner solved, and the peak memory over all.
+
+    ``peak_rss_mb`` is the highest resident memory of the worker process while the planner ran:
+    libraries and the verdicts that all planners share are in it.
+    """
     return _by_cell(rows, _times)
 
 

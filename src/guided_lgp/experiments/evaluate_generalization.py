@@ -46,7 +46,7 @@ PLANNERS: Mapping[str, Callable[..., SearchResult]] = {
     "adaptation": guided.plan,
     "best_first": partial(best_first.plan, ordering="cumulative"),
 }
-"""``best_first`` adapts the objective, too."""
+"""``best_first`` adapts the objective, too; its ordering is the one that favours short plans."""
 
 OUTCOMES = ("shortest", "feasible", "no_solution")
 

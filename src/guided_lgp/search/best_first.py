@@ -14,7 +14,11 @@ from guided_lgp.search.policy import Policy
 from guided_lgp.search.result import Run, SearchResult
 
 Ordering = Literal["cumulative", "discrepancy"]
-"""Cumulative log p, or log p - max log p of the siblings, summed along the sequence."""
+"""Cumulative log p, or log p - max log p of the siblings, summed along the sequence.
+
+The first favours short sequences. On long tasks equally good actions split the probability, and it
+expands all that is shorter first; the second takes a few more actions now and then, and its
+expansions stay near their number."""
 
 REVISIT = 3.0
 """Cost (nats) for every node expanded before with the same symbolic state.
