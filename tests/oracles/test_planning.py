@@ -33,7 +33,7 @@ from guided_lgp.search.tree import StateSpace, distances
 GRIPPERS = ("pr2L", "pr2R")
 THREE = Symbols(GRIPPERS, ("red", "green", "blue"), ("tab1", "tab2"))
 FOUR = Symbols(GRIPPERS, ("red", "green", "blue", "yellow"), ("tab1", "tab2", "tray"))
-PAIRS = {THREE: 180, FOUR: 20}
+PAIRS = {THREE: 190, FOUR: 10}
 
 
 def random_pair(symbols: Symbols, rng: np.random.Generator) -> tuple[State, Objective]:
