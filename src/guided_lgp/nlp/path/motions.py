@@ -58,15 +58,20 @@ class Mover:
         return self._space(still).collision(q)
 
     def line(
-        self, arm: Arm, tool: tuple[Array, Array], direction: Array, pan: float, side: int
+        self,
+        arm: Arm,
+        tool: tuple[Array, Array],
+        direction: Array,
+        pans: tuple[float, float],
+        side: int,
     ) -> Array | None:
-        """Move the tool straight, without turning it, at constant pan angle.
+        """Move the tool straight, without turning it.
 
         Args:
             arm: the arm.
             tool: rotation (3, 3) and origin (3,) of the tool frame at the start.
             direction: displacement (3,) of the tool (m).
-            pan: angle of the pan joint (rad).
+            pans: angle of the pan joint (rad) at the start and at the end.
             side: of the elbow.
 
         Returns:
@@ -74,7 +79,7 @@ class Mover:
         """
         count = 2 + int(np.linalg.norm(direction) / LINE_STEP)
         position = tool[1] + np.linspace(0.0, 1.0, count)[:, None] * direction
-        q, valid = arm.inverse(tool[0], position, np.full(count, pan))
+        q, valid = arm.inverse(tool[0], position, np.linspace(*pans, count))
         path = continuous_path(q[:, side], valid[:, side])
         if path is None:
             return None

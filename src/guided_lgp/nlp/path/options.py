@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import islice
+from itertools import islice, product
 
 import numpy as np
 
@@ -41,6 +41,8 @@ _FORESEEN = 10
 """Elbow postures at the later place that are looked at per grip."""
 _OUTCOMES = 4
 """Ways to carry out an action that are passed on, before an earlier action is changed."""
+_PAN_SHIFTS = (0.0, 0.25, -0.25, 0.5, -0.5)
+"""Turns of the pan joint (rad) on the straight way off a box that are tried."""
 _SAMPLES = 24
 """Placements tried beside the coarse bound's."""
 
@@ -288,7 +290,11 @@ class Options:
         tool = (reach.rotation[number], reach.contact[number])
         before = continuous_near(reach.q[number, 1, pan, side], start)
         line = self._line(
-            situation.still(gripper, [(gripper, box)]), tool, -APPROACH * tool[0][:, 0], angle, side
+            situation.still(gripper, [(gripper, box)]),
+            tool,
+            -APPROACH * tool[0][:, 0],
+            (angle, angle),
+            side,
         )
         if isinstance(line, str):
             self._trouble.note(index, 4, f"approach {line}")
@@ -301,8 +307,9 @@ class Options:
         held = replace(self._after(reached, [closed, attach]), state=self._states[index + 1])
         support = state.support_of(box)
         assert support is not None
-        for direction in _lifts(tool[0][:, 0]):
-            lift = self._line(held.still(gripper, [(box, support)]), tool, direction, angle, side)
+        rising = held.still(gripper, [(box, support)])
+        for direction, shift in product(_lifts(tool[0][:, 0]), _PAN_SHIFTS):
+            lift = self._line(rising, tool, direction, (angle, angle + shift), side)
             if isinstance(lift, str):
                 self._trouble.note(index, 5, f"lift {lift}")
                 continue
@@ -425,18 +432,17 @@ class Options:
             left = replace(
                 self._opened(expected, gripper), standing=standing, state=self._states[later + 1]
             )
-            back = arm.inverse(
-                reach.rotation[number],
-                reach.contact[number] - APPROACH * reach.rotation[number][:, 0],
-                reach.pans[pan],
-            )
-            if not back[1][side]:
+            tool = reach.rotation[number], reach.contact[number]
+            ends = np.array([tool[1] + way for way in _retreats(tool[0][:, 0])])[:, None]
+            back, valid = arm.inverse(tool[0], ends, reach.pans[pan] + np.array(_PAN_SHIFTS))
+            if not valid[..., side].any():
                 self._trouble.note(later, 2, "retreat out of reach")
-                continue
-            blocked = self._mover.collision(left.still(gripper), back[0][side][None])
-            if blocked is None:
-                return True
-            self._note(later, 3, "retreat collision", blocked)
+            leaving = left.still(gripper)
+            for end in back[..., side, :][valid[..., side]]:
+                blocked = self._mover.collision(leaving, end[None])
+                if blocked is None:
+                    return True
+                self._note(later, 3, "retreat collision", blocked)
         return False
 
     # -- Placements --------------------------------------------------------------------------
@@ -502,9 +508,8 @@ class Options:
         angle = float(reach.pans[pan])
         tool = (reach.rotation[number], reach.contact[number])
         riders = state.carried_by(box)
-        line = self._line(
-            situation.still(gripper, [(box, action.table)]), tool, LIFT * _UP, angle, side
-        )
+        still = situation.still(gripper, [(box, action.table)])
+        line = self._line(still, tool, LIFT * _UP, (angle, angle), side)
         if isinstance(line, str):
             self._trouble.note(index, 4, f"descent {line}")
             return None
@@ -513,8 +518,9 @@ class Options:
         hand_over = self._hand_over(index, (box, *riders))
         left = self._after(lowered, [release, *hand_over, opening])
         left = replace(left, state=self._states[index + 1])
-        for direction in _retreats(tool[0][:, 0]):
-            back = self._line(left.still(gripper, [(gripper, box)]), tool, direction, angle, side)
+        leaving = left.still(gripper, [(gripper, box)])
+        for direction, shift in product(_retreats(tool[0][:, 0]), _PAN_SHIFTS):
+            back = self._line(leaving, tool, direction, (angle, angle + shift), side)
             if isinstance(back, str):
                 self._trouble.note(index, 5, f"retreat {back}")
                 continue
@@ -626,10 +632,15 @@ class Options:
         return replace(reach, cost=cost)
 
     def _line(
-        self, still: Still, tool: tuple[Array, Array], direction: Array, pan: float, side: int
+        self,
+        still: Still,
+        tool: tuple[Array, Array],
+        direction: Array,
+        pans: tuple[float, float],
+        side: int,
     ) -> Array | str:
         """A free straight line of the tool, or what is wrong with it."""
-        path = self._mover.line(self._arms[still.mode.gripper], tool, direction, pan, side)
+        path = self._mover.line(self._arms[still.mode.gripper], tool, direction, pans, side)
         if path is None:
             return "out of reach"
         blocked = self._mover.collision(still, path)
@@ -670,5 +681,5 @@ def _lifts(approach: Array) -> list[Array]:
 
 
 def _retreats(approach: Array) -> list[Array]:
-    """Directions (m) in which the open hand leaves a box: back, back and up."""
-    return [-APPROACH * approach, APPROACH * (0.5 * _UP - approach)]
+    """Directions (m) in which the open hand leaves a box: back, back and up, up."""
+    return [-APPROACH * approach, APPROACH * (0.5 * _UP - approach), 0.11 * _UP]
