@@ -26,6 +26,7 @@ repro: setup
 	git rev-parse --git-dir > /dev/null 2>&1 || dvc config --local core.no_scm true
 	dvc repro
 	guided-lgp mlflow sync
+	python -m guided_lgp.report.readme
 
 test: lint
 	pytest -n auto --dist loadfile

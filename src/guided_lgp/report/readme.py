@@ -5,6 +5,8 @@ from pathlib import Path
 from guided_lgp.errors import InputError
 from guided_lgp.paths import REPORTS
 
+BEGIN = "<!-- results: written by make repro -->"
+END = "<!-- end of results -->"
 TABLES = ("table_1", "table_3_tree_size", "table_3_time")
 
 
@@ -24,3 +26,23 @@ def readme_block(root: Path) -> str:
             raise InputError(str(path), "is missing", "the output of stage render_reports")
         texts.append(path.read_text(encoding="utf-8"))
     return "\n".join(texts)
+
+
+def update_readme(root: Path) -> None:
+    """Replace the results between the two markers of ``README.md`` by the current ones.
+
+    Raises:
+        InputError: a table or a marker is missing.
+    """
+    path = root / "README.md"
+    text = path.read_text(encoding="utf-8")
+    before, begin, rest = text.partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not end:
+        raise InputError(str(path), "has no markers of the results", f"{BEGIN} and {END}")
+    block = readme_block(root)
+    path.write_text(f"{before}{begin}\n\n{block}\n{end}{after}", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    update_readme(Path.cwd())
