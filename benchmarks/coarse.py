@@ -1,0 +1,137 @@
+"""Benchmark of the coarse bound: time per solve, reliability, IPOPT on the same programs.
+
+Needs nothing that the pipeline makes: python benchmarks/coarse.py [sequences per length]
+"""
+
+import json
+import sys
+import time
+from dataclasses import dataclass
+from statistics import fmean, median
+from typing import Any
+
+import numpy as np
+
+from guided_lgp.logic import Skeleton, applicable_actions, successor
+from guided_lgp.nlp.coarse import CoarseBound
+from guided_lgp.nlp.coarse.formulation import Formulator, Margins, SceneGeometry
+from guided_lgp.nlp.coarse.ipopt import Ipopt
+from guided_lgp.nlp.coarse.solver import Settings, default_solver
+from guided_lgp.nlp.coarse.starts import Starts
+from guided_lgp.nlp.results import CoarseResult
+from guided_lgp.scene import Scene
+from guided_lgp.scene.generate import generate
+
+LENGTHS = (2, 4, 6, 8, 10)
+SEED = 20_001
+"""Of scenes and sequences; no stage of the pipeline uses it."""
+CONFIGURATIONS = 20
+TRIES, MANY_TRIES = 9, 40
+PROGRAMS_FOR_IPOPT = 6
+"""Programs per length that IPOPT gets: it takes seconds to build one."""
+
+
+@dataclass(frozen=True)
+class Sequence:
+    """A random sequence with what the bound says of it."""
+
+    scene: Scene
+    result: CoarseResult
+    prefix: CoarseResult | None
+    """Of the longest proper prefix that was asked."""
+    with_many_tries: bool
+
+
+def measure(count: int = 100, setup: str = "a") -> dict[str, Any]:
+    """Figures per length K over ``count`` random sequences; times in ms on one core."""
+    scenes = generate(setup, CONFIGURATIONS, SEED, "bench").scenes
+    return {str(length): _length(length, count, scenes) for length in LENGTHS}
+
+
+def _length(length: int, count: int, scenes: tuple[Scene, ...]) -> dict[str, Any]:
+    rng = np.random.default_rng([SEED, length])
+    sequences: list[Sequence] = []
+    for index, scene in enumerate(scenes):
+        usual, patient = CoarseBound(scene, TRIES), CoarseBound(scene, MANY_TRIES)
+        for _ in range(index, count, len(scenes)):
+            sequences.append(_judge(_random(scene, length, rng), scene, usual, patient))
+    solved = [sequence for sequence in sequences if sequence.result.feasible]
+    times = [_one_start(sequence) for sequence in solved]
+    possible = sum(sequence.with_many_tries for sequence in sequences)
+    return {
+        "n": count,
+        "coarse_median_ms": median(times) * 1e3,
+        "coarse_verified_median_ms": median(s.result.time_s for s in solved) * 1e3,
+        "coarse_first_try": fmean(sequence.result.tries == 1 for sequence in solved),
+        "false_infeasible": 1 - len(solved) / possible,
+        "infeasible_share": 1 - len(solved) / count,
+        "ipopt": _against_ipopt(solved[:: max(1, len(solved) // PROGRAMS_FOR_IPOPT)]),
+    }
+
+
+def _random(scene: Scene, length: int, rng: np.random.Generator) -> Skeleton:
+    state, skeleton = scene.state, []
+    for _ in range(length):
+        actions = list(applicable_actions(state, scene.symbols))
+        skeleton.append(actions[rng.integers(len(actions))])
+        state = successor(state, skeleton[-1])
+    return tuple(skeleton)
+
+
+def _judge(skeleton: Skeleton, scene: Scene, usual: CoarseBound, patient: CoarseBound) -> Sequence:
+    prefix: CoarseResult | None = None
+    result = usual.solve(skeleton[:1])
+    while result.feasible and len(result.skeleton) < len(skeleton):
+        prefix = result
+        result = usual.solve(skeleton[: len(prefix.skeleton) + 1], prefix)
+    second = result if result.feasible else patient.solve(result.skeleton, prefix)
+    while second.feasible and len(second.skeleton) < len(skeleton):
+        second = patient.solve(skeleton[: len(second.skeleton) + 1], second)
+    return Sequence(scene, result, prefix, second.feasible)
+
+
+def _one_start(sequence: Sequence) -> float:
+    """Seconds from skeleton and prefix to the end of the first start, without verification."""
+    geometry = SceneGeometry(sequence.scene)
+    starts = Starts(geometry, default_solver())
+    began = time.perf_counter()
+    formulation = Formulator(geometry, Margins()).build(sequence.result.skeleton)
+    known = getattr(sequence.prefix, "values", None)
+    start = starts.draw(formulation, np.random.default_rng(0), 0.0, known)
+    default_solver().solve(formulation.program, start, Settings())
+    return time.perf_counter() - began
+
+
+def _against_ipopt(sequences: list[Sequence]) -> dict[str, Any]:
+    """Both solvers from the same starts, that know no prefix.
+
+    The time to build IPOPT's programs is left out. IPOPT goes on to a local optimum, where the
+    bound needs, and its solver stops at, a feasible point.
+    """
+    ours, theirs, converged = [], [], []
+    for sequence in sequences:
+        geometry = SceneGeometry(sequence.scene)
+        formulation = Formulator(geometry, Margins()).build(sequence.result.skeleton)
+        start = Starts(geometry, default_solver()).draw(
+            formulation, np.random.default_rng(0), noise=0.0
+        )
+        oracle = Ipopt(formulation.program, start, Settings())
+        began = time.perf_counter()
+        their = oracle.solve(start)
+        between = time.perf_counter()
+        our = default_solver().solve(formulation.program, start, Settings())
+        ours.append(time.perf_counter() - between)
+        theirs.append(between - began)
+        converged.append((our.converged(Settings()), their.converged(Settings())))
+    return {
+        "n": len(sequences),
+        "solver_median_ms": median(ours) * 1e3,
+        "ipopt_median_ms": median(theirs) * 1e3,
+        "times_faster": median(b / a for a, b in zip(ours, theirs, strict=True)),
+        "solver_converged": fmean(our for our, _ in converged),
+        "ipopt_converged": fmean(their for _, their in converged),
+    }
+
+
+if __name__ == "__main__":
+    print(json.dumps(measure(*map(int, sys.argv[1:2])), indent=2))
