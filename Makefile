@@ -38,7 +38,7 @@ lint: setup
 	lint-imports
 
 bench: setup
-	guided-lgp bench
+	python benchmarks/run.py
 
 mlflow: setup
 	guided-lgp mlflow ui
