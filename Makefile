@@ -38,6 +38,7 @@ lint: setup
 	lint-imports
 
 bench: setup
+	dvc repro -q generate_scenes
 	python benchmarks/run.py
 
 mlflow: setup

@@ -10,7 +10,6 @@ from pathlib import Path
 import coarse
 import path
 import search
-
 from guided_lgp.experiments.files import write_metrics
 from guided_lgp.paths import METRICS
 
