@@ -57,4 +57,3 @@ def plan(
         return breadth_first.plan(scene, goals, scene.symbols, bounds, limits)
     search = guided.plan if planner == "guided" else best_first.plan
     return search(scene, goals, scene.symbols, bounds, load_policy(models), limits)
-
