@@ -101,7 +101,12 @@ def plan(
             help='What must hold at the end: "(on BOX TABLE)" or "(held BOX)"; repeatable.'
         ),
     ],
-    planner: Annotated[Planner, typer.Option(help="How to search.")] = Planner.GUIDED,
+    planner: Annotated[
+        Planner,
+        typer.Option(
+            help="The paper's search; the same, but complete within its limits; no policy at all."
+        ),
+    ] = Planner.GUIDED,
     out: Annotated[Path | None, typer.Option(help="Write the plan as JSON.")] = None,
     html: Annotated[
         Path | None, typer.Option(help="Write the motion as a 3D page for the browser.")
