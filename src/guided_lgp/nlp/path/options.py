@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice, product
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -31,6 +32,11 @@ APPROACH = 0.09
 LIFT = 0.08
 """Length (m) of the straight way up after a grasp and down to a place."""
 _UP = np.array([0.0, 0.0, 1.0])
+_SIDEWAYS = [0.05 * _UP + 0.07 * side for side in np.vstack([np.eye(3)[:2], -np.eye(3)[:2]])]
+"""Ways (m) up from a place past an arm that leans over it."""
+Variant = Literal["straight", "sideways", "elsewhere"]
+"""How a place differs from the coarse one: not, in the way down, in the placement."""
+_VARIANTS: tuple[Variant, ...] = get_args(Variant)
 _PANS = np.linspace(-0.7, 2.28, 15)
 """Pan angles (rad) of the left arm that are tried for every pose, beside the coarse one."""
 _CONFIGURATIONS = 150
@@ -43,6 +49,8 @@ _OUTCOMES = 4
 """Ways to carry out an action that are passed on, before an earlier action is changed."""
 _PAN_SHIFTS = (0.0, 0.25, -0.25, 0.5, -0.5)
 """Turns of the pan joint (rad) on the straight way off a box that are tried."""
+_CLEARANCE = 0.03
+"""Distance (m) of these from other boxes on the same table: room for fingers."""
 _SAMPLES = 24
 """Placements tried beside the coarse bound's."""
 
@@ -222,17 +230,17 @@ class Options:
     def _grasps(self, index: int, situation: Situation) -> Iterator[Outcome]:
         central, others = self._grips[self._skeleton[index].box]
         situation = self._opened(situation, self._skeleton[index].gripper)
-        for alternative in (False, True):
+        for variant in _VARIANTS:
             for grips in (central + self._coarse_grip(index), others):
-                yield from self._grasps_with(index, situation, grips, alternative)
+                yield from self._grasps_with(index, situation, grips, variant)
 
     def _grasps_with(
-        self, index: int, situation: Situation, grips: Grips, alternative: bool
+        self, index: int, situation: Situation, grips: Grips, variant: Variant
     ) -> Iterator[Outcome]:
-        """Grasps with one of a set of grips, for the coarse placement later or for others."""
+        """Grasps with one of a set of grips, for one variant of the later place."""
         action = self._skeleton[index]
         gripper, box = action.gripper, action.box
-        foresight = self._foresight(index, situation, grips, alternative)
+        foresight = self._foresight(index, situation, grips, variant)
         if foresight is None:
             return
         box_pose = situation.boxes(self._arms)[box]
@@ -340,33 +348,29 @@ class Options:
         return None
 
     def _foresight(
-        self, index: int, situation: Situation, grips: Grips, alternative: bool
+        self, index: int, situation: Situation, grips: Grips, variant: Variant
     ) -> "_Foresight | None":
-        """What a grasp must know about the later place of the box, at the coarse placement or
-        at alternative ones; None if there is nothing (else) to know.
+        """What a grasp must know about a variant of the later place of the box; None if there is
+        no place and hence no further variant.
         """
         box = self._skeleton[index].box
         later = next(
             (j for j in range(index + 1, len(self._skeleton)) if self._skeleton[j].box == box), None
         )
         if later is None:
-            return None if alternative else _Foresight(np.zeros(len(grips)), lambda grip: True)
+            first = variant == _VARIANTS[0]
+            return _Foresight(np.zeros(len(grips)), lambda grip: True) if first else None
         action = self._skeleton[later]
         assert action.table is not None
         expected = self._expected(index, later, situation)
         support = self._top(action.table, self._contacts[later])
         reference = placement_of(support, self._contacts[later].boxes[box])
-        placements = [reference]
-        if alternative:
-            placements = self._alternatives(later, expected, support, reference)
-        half_height = self._boxes[box].size[2] / 2
-        targets = [placed(support, placement, half_height) for placement in placements]
+        targets, ways = self._variant(later, expected, support, reference, variant)
         tools = [grips.tools(target[:3], rotation_matrix(target[3:])) for target in targets]
         rotation = np.concatenate([tool[0] for tool in tools])
         contact = np.concatenate([tool[1] for tool in tools])
-        reach = self._reach(
-            later, self._arms[action.gripper], rotation, contact, contact + LIFT * _UP
-        )
+        above = contact + np.repeat(ways, len(grips), axis=0)
+        reach = self._reach(later, self._arms[action.gripper], rotation, contact, above)
         cost = reach.cost.reshape(len(targets), len(grips), -1).min(axis=(0, 2))
         if not np.isfinite(cost).any():
             self._trouble.note(later, 0, f"no inverse kinematics to place {box}")
@@ -398,7 +402,7 @@ class Options:
         self,
         later: int,
         expected: Situation,
-        targets: list[Array],
+        targets: Array,
         reach: _Reach,
         grips: Grips,
         grip: int,
@@ -455,28 +459,40 @@ class Options:
             self._top(action.table, self._contacts[index]), self._contacts[index].boxes[action.box]
         )
         support = self._top(action.table, now)
-        yield from self._places_at(index, situation, support, [reference])
-        others = self._alternatives(index, situation, support, reference)
-        yield from self._places_at(index, situation, support, others)
+        for variant in _VARIANTS:
+            targets, ways = self._variant(index, situation, support, reference, variant)
+            yield from self._places_at(index, situation, targets, ways)
+
+    def _variant(
+        self, index: int, situation: Situation, support: Array, reference: Array, variant: Variant
+    ) -> tuple[Array, Array]:
+        """Poses (n, 7) of a box to be placed, and ways (n, 3) up from there (m)."""
+        placements, ways = [reference], [LIFT * _UP]
+        if variant == "sideways":
+            ways = _SIDEWAYS
+        elif variant == "elsewhere":
+            placements = self._alternatives(index, situation, support, reference)
+        half_height = self._boxes[self._skeleton[index].box].size[2] / 2
+        pairs = list(product(placements, ways))
+        targets = np.array([placed(support, placement, half_height) for placement, _ in pairs])
+        return targets, np.array([way for _, way in pairs])
 
     def _places_at(
-        self, index: int, situation: Situation, support: Array, placements: list[Array]
+        self, index: int, situation: Situation, targets: Array, ways: Array
     ) -> Iterator[Outcome]:
         action = self._skeleton[index]
         assert action.table is not None
         gripper, box = action.gripper, action.box
-        half_height = self._boxes[box].size[2] / 2
-        targets = np.array([placed(support, p, half_height) for p in placements])
         tools = compose(targets, inverse(situation.carried[box][1]))
         rotation, contact = rotation_matrix(tools[:, 3:]), tools[:, :3]
-        reach = self._reach(index, self._arms[gripper], rotation, contact, contact + LIFT * _UP)
+        reach = self._reach(index, self._arms[gripper], rotation, contact, contact + ways)
         if situation.state.carried_by(box):
             reach = self._level_reach(reach, gripper, situation)
         if not np.isfinite(reach.cost).any():
             self._trouble.note(index, 0, f"no inverse kinematics to place {box}")
             return
         down, free = situation.still(gripper, [(box, action.table)]), situation.still(gripper)
-        planned = np.zeros(len(placements), dtype=int)
+        planned = np.zeros(len(targets), dtype=int)
         for choice in reach.order()[:_CONFIGURATIONS]:
             number, pan, side = choice
             if planned[number] >= _ELBOWS:
@@ -491,13 +507,18 @@ class Options:
                 self._note(index, 2, "descent collision", blocked)
                 continue
             planned[number] += 1
-            outcome = self._place(index, situation, reach, choice)
+            outcome = self._place(index, situation, reach, choice, ways[number])
             if outcome is not None:
                 planned[number] = _ELBOWS
                 yield outcome
 
     def _place(
-        self, index: int, situation: Situation, reach: _Reach, choice: tuple[int, int, int]
+        self,
+        index: int,
+        situation: Situation,
+        reach: _Reach,
+        choice: tuple[int, int, int],
+        way: Array,
     ) -> Outcome | None:
         """Plan all motions of a place, straight lines first."""
         action, state = self._skeleton[index], situation.state
@@ -509,7 +530,7 @@ class Options:
         tool = (reach.rotation[number], reach.contact[number])
         riders = state.carried_by(box)
         still = situation.still(gripper, [(box, action.table)])
-        line = self._line(still, tool, LIFT * _UP, (angle, angle), side)
+        line = self._line(still, tool, way, (angle, angle), side)
         if isinstance(line, str):
             self._trouble.note(index, 4, f"descent {line}")
             return None
@@ -589,7 +610,8 @@ class Options:
             self._half(box),
             self._masses(index),
             others,
-            on_table,
+            _CLEARANCE if on_table else 0.0,
+            on_table or situation.state.holder(table) is not None,
             self._rng,
             _SAMPLES,
         )

@@ -13,8 +13,6 @@ from guided_lgp.scene.poses import compose, inverse, pose, yaw_of
 
 MARGIN = 0.02
 """Distance (m) of a centre of mass from the edge of what it stands on."""
-CLEARANCE = 0.03
-"""Distance (m) of sampled boxes from others on the same support: room for fingers."""
 _JITTER = np.array([0.006, 0.006, 0.08])
 _SAMPLES_DRAWN = 120
 
@@ -38,7 +36,8 @@ def alternatives(
     half: Array,
     masses: Array,
     others: Sequence[tuple[Array, Array]],
-    on_table: bool,
+    clearance: float,
+    anywhere: bool,
     rng: np.random.Generator,
     count: int,
 ) -> list[Array]:
@@ -50,12 +49,14 @@ def alternatives(
         half: half extents (2,) of the box.
         masses: (n, 2) centres of mass in the box's frame: its own, and with what it will carry.
         others: placement and half extents (2,) of the boxes that stand there or will.
-        on_table: tables are sampled as a whole; on a box the coarse place is varied a little.
+        clearance: distance (m) from the others.
+        anywhere: sample the whole support; otherwise vary the coarse placement a little, since
+            what stands below depends on it for its balance.
         rng: source of randomness.
         count: largest number of samples to return.
     """
     half_turn = reference + np.array([0.0, 0.0, np.pi])
-    if on_table:
+    if anywhere:
         low = np.array([*-support_half, -np.pi])
         drawn = rng.uniform(low, -low, (_SAMPLES_DRAWN, 3))
     else:
@@ -70,7 +71,6 @@ def alternatives(
     drawn = drawn[inside]
     distance = np.hypot(drawn[:, 0] - reference[0], drawn[:, 1] - reference[1])
     standing = [_corners(*other) for other in others]
-    clearance = CLEARANCE if on_table else 0.0
     found = [half_turn]
     for sample in drawn[np.argsort(distance, kind="stable")]:
         if len(found) > count:
