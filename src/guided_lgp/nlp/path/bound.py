@@ -16,7 +16,7 @@ from guided_lgp.scene.world import World
 
 _ITERATIONS = 150
 """Samples of the sampling planner per motion."""
-_QUERIES = 150
+_QUERIES = 400
 """Collision queries per action and coarse solution."""
 
 
