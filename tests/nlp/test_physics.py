@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from motions import CLOSED, Motion, from_above, grasp, place, reach, scene, shifted
 
@@ -9,7 +10,8 @@ from guided_lgp.logic import parse_objective, parse_skeleton
 from guided_lgp.nlp.physics import execute
 from guided_lgp.nlp.results import Trajectory
 from guided_lgp.scene import Scene, pr2
-from guided_lgp.scene.poses import pose
+from guided_lgp.scene.poses import compose, pose
+from guided_lgp.scene.reach import grasp_poses
 
 STACK = parse_skeleton("(grasp pr2L red) (place pr2L red green)")
 STACKED = parse_objective(["(on red green)", "(on green tab1)"])
@@ -82,3 +84,29 @@ def test_plan_that_is_not_of_the_skeleton_is_not_executed(
     report = execute(neighbours, STACKED, STACK, replace(stacking, attachments=()))
     assert not report.success
     assert report.fault == "attachments"
+
+
+@pytest.mark.parametrize(("period", "stays"), [(0.08, True), (0.006, False)])
+def test_box_on_a_held_box_rides_by_friction_alone(period: float, stays: bool) -> None:
+    """Carried gently it stays where it is, jerked away it falls."""
+    stacked = scene(red=(0.52, 0.30, 0.65, 0.2, "tab1"), green=(0.52, 0.30, 0.75, 1.77, "red"))
+    box = stacked.boxes[0]
+    tool = next(t for t in grasp_poses(box) if compose(t, pose((1, 0, 0)))[2] - t[2] > -0.01)
+    back = compose(tool, pose((-0.10, 0, 0)))
+    at = reach(stacked, "pr2L", tool)
+    away = reach(stacked, "pr2L", back, at)
+    above = reach(stacked, "pr2L", shifted(back, z=0.20), away)
+    lifted = reach(stacked, "pr2L", shifted(tool, z=0.10), at)
+    aside = reach(stacked, "pr2L", shifted(tool, y=0.20, z=0.10), lifted)
+    motion = Motion(stacked).move("pr2L", above).move("pr2L", away).move("pr2L", at)
+    motion.hand("pr2L", CLOSED).attach("red", "pr2L").attach("green", "pr2L")
+    motion.move("pr2L", lifted)
+    slow = motion.trajectory(0.05)
+    motion.move("pr2L", aside).move("pr2L", lifted).move("pr2L", aside)
+    path = motion.trajectory(period)
+    rows = len(slow.times)
+    times = np.r_[slow.times, slow.times[-1] + path.times[1 : len(path.times) - rows + 1]]
+    objective = parse_objective(["(held red)", "(on green red)"])
+    skeleton = parse_skeleton("(grasp pr2L red)")
+    report = execute(stacked, objective, skeleton, replace(path, times=times))
+    assert report.goals["(on green red)"] is stays
