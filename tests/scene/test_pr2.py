@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from guided_lgp.errors import InputError
 from guided_lgp.scene import GRIPPERS, Scene, Table, generate, pr2
 from guided_lgp.scene.poses import Array, apply, compose, inverse, pose, tilt, yaw_of
 from guided_lgp.scene.reach import grasp_poses, solve_arm
@@ -41,6 +42,13 @@ def test_description_is_cached_under_its_content(
     before = path.stat().st_mtime_ns
     assert pr2.urdf_path.__wrapped__() == path
     assert path.stat().st_mtime_ns == before
+
+
+def test_unusable_cache_folder_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    with pytest.raises(InputError, match=r"guided-lgp: .*XDG_CACHE_HOME"):
+        pr2.urdf_path.__wrapped__()
 
 
 def test_limits_are_the_urdfs() -> None:

@@ -220,10 +220,14 @@ def _cached(name: str, suffix: str, content: bytes) -> Path:
     base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     target = Path(base) / "guided-lgp" / f"{name}-{sha256(content).hexdigest()[:16]}.{suffix}"
     if not target.exists():
-        target.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=target.parent, delete=False) as file:
-            file.write(content)
-        Path(file.name).replace(target)
+        try:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            with tempfile.NamedTemporaryFile(dir=target.parent, delete=False) as file:
+                file.write(content)
+            Path(file.name).replace(target)
+        except OSError as error:
+            fault = error.strerror or "cannot be written"
+            raise InputError(str(target.parent), fault, "a writable $XDG_CACHE_HOME") from None
     return target
 
 
