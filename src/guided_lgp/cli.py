@@ -84,10 +84,14 @@ def doctor(as_json: AsJson = False) -> None:
     if as_json:
         typer.echo(json.dumps([asdict(finding) for finding in findings], indent=1))
     else:
-        for finding in findings:
-            typer.echo(f"{'ok  ' if finding.ok else 'FAIL'}  {finding.name}: {finding.detail}")
-            if finding.mend:
-                typer.echo(f"      {finding.mend}")
+        marks = {True: "ok", False: "FAIL"}
+        _show(
+            ["", "check", "found", "how to mend it"],
+            [
+                (marks[finding.ok], finding.name, finding.detail, finding.mend)
+                for finding in findings
+            ],
+        )
     if not all(finding.ok for finding in findings):
         raise typer.Exit(1)
 
@@ -181,8 +185,7 @@ def plan(
     if as_json:
         typer.echo(json.dumps(summary, indent=1))
         return
-    for number, action in enumerate(path.skeleton, 1):
-        typer.echo(f"{number:2d}  {action}")
+    _show(["", "action"], [(str(k), str(a)) for k, a in enumerate(path.skeleton, 1)])
     typer.echo(f"motion of {path.trajectory.times[-1]:.1f} s, found in {sum(times.values()):.1f} s")
     if physics is not None:
         fault = physics["fault"] or f"goals: {physics['goals']}"
@@ -322,6 +325,22 @@ def _run_stage(stage: str, params_file: Path, *arguments: str) -> None:
     module = import_module(STAGES[stage])
     with tracking.recorded("@".join([stage, *arguments]), params):
         module.run(params, Path.cwd(), *arguments)
+
+
+def _show(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Print rows: a table on a terminal, lines with tabs in a pipe."""
+    if not sys.stdout.isatty():
+        for row in rows:
+            typer.echo("\t".join(filter(None, row)))
+        return
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(*columns)
+    for row in rows:
+        table.add_row(*map(Text, row))
+    Console().print(table)
 
 
 def _is_plan(file: Path) -> bool:
