@@ -133,7 +133,7 @@ class CoarseBound:
     ) -> CoarseSolution:
         """Decode and verify a solution."""
         if not solution.converged(self._settings):
-            failure = _worst(formulation, solution)
+            failure = _worst(formulation, solution, self._settings.slack)
             return CoarseSolution(skeleton, feasible=False, failure=failure, tries=tries)
         contacts = self._keyframes(formulation, formulation.contacts, solution.values)
         retreated = self._keyframes(formulation, formulation.retreated, solution.values)
@@ -219,20 +219,21 @@ def _in_tool(mode: Mode, values: Array) -> Array:
     return np.array([reach + pr2.PALM_FRONT + PALM_GAP, 0.0, offset, *turned])
 
 
-def _worst(formulation: Formulation, solution: Solution) -> Failure:
+def _worst(formulation: Formulation, solution: Solution, slack: float) -> Failure:
     """The constraint that is violated most."""
     starts = formulation.program.row_start
-    worst = (-1.0, 0, 0)
-    for index, row in enumerate(formulation.rows):
-        values = solution.residuals[starts[index] : starts[index + 1]]
-        amounts = np.abs(values) if kernels()[row.kernel].equality else -values
-        position = int(np.argmax(amounts))
-        worst = max(worst, (float(amounts[position]), -index, position))
-    amount, index, position = worst[0], -worst[1], worst[2]
+    excess, index, position = -np.inf, 0, 0
+    for i, row in enumerate(formulation.rows):
+        values = solution.residuals[starts[i] : starts[i + 1]]
+        amounts = np.abs(values) if kernels()[row.kernel].equality else -values - slack
+        highest = int(np.argmax(amounts))
+        if amounts[highest] > excess:
+            excess, index, position = float(amounts[highest]), i, highest
     row = formulation.rows[index]
-    kernel = kernels()[row.kernel].name
+    kernel = kernels()[row.kernel]
+    amount = abs(float(solution.residuals[starts[index] + position]))
     names = list(row.names)
-    if kernel in ("clear", "apart"):
-        side = pr2.SIDE[names[1]]
-        names[1] = f"{side}_{sphere_link(position, kernel)}"
-    return Failure(row.action, " ".join(names), amount / SCALE, "solver")
+    if kernel.name in ("clear", "apart"):
+        names[1] = f"{pr2.SIDE[names[1]]}_{sphere_link(position, kernel.name)}"
+    scale = SCALE if position < kernel.lengths else 1.0
+    return Failure(row.action, " ".join(names), amount / scale, "solver")

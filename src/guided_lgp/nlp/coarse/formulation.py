@@ -462,6 +462,7 @@ class Formulator:
     def _avoid(self, posture: Posture, excluded: tuple[str, ...]) -> None:
         """Keep an arm clear of tables, level boxes and the other arm."""
         gripper = posture.gripper
+        (other,) = (name for name in GRIPPERS if name != gripper)
         for joints in (posture.joints, *(leg.joints for leg in posture.legs)):
             for name in self._geometry.tables:
                 self._clear(gripper, joints, name)
@@ -470,13 +471,13 @@ class Formulator:
                 at_side = held is not None and held.gripper not in self._joints
                 if name not in excluded and not at_side:
                     self._clear(gripper, joints, name)
-        (other,) = (name for name in GRIPPERS if name != gripper)
-        self._instance(
-            "apart",
-            (*posture.joints, *self._joints.get(other, self._home[other])),
-            (SIDES[gripper], SIDES[other], self._torso, self._margins.arms, *RADII),
-        )
-        self._name("collision", gripper, other)
+            if joints is posture.joints or other in self._joints:
+                self._instance(
+                    "apart",
+                    (*joints, *self._joints.get(other, self._home[other])),
+                    (SIDES[gripper], SIDES[other], self._torso, self._margins.arms, *RADII),
+                )
+                self._name("collision", gripper, other)
 
     def _clear(self, gripper: str, joints: tuple[int, ...], name: str) -> None:
         level = self._level[name]

@@ -25,6 +25,15 @@ SCALE = 5.0
 STACK = 8
 """Most boxes in one sum of weights."""
 
+PALM_GAP = 0.002
+"""Distance of the box's nearest corner from the palm (m)."""
+
+PAD_CENTRE = -0.02
+"""x of the centre of the fingertips' pads in the tool frame (m)."""
+
+RADII = np.array([sphere.radius for sphere in SPHERES])
+"""Radii (m) of the spheres."""
+
 
 @dataclass(frozen=True)
 class Kernel:
@@ -39,13 +48,23 @@ class Kernel:
     inputs: int
     parameters: int
     rows: int
+    lengths: int
+    """How many rows, the first ones, are lengths; the others are in rad."""
     residual: Any
     jacobian: Any
     independent: Any
     """Like ``residual``, with no more rows than independent constraints, for other solvers."""
 
 
-def _kernel(name: str, equality: bool, x: Any, p: Any, c: Any, independent: Any = None) -> Kernel:
+def _kernel(
+    name: str,
+    equality: bool,
+    x: Any,
+    p: Any,
+    c: Any,
+    lengths: int | None = None,
+    independent: Any = None,
+) -> Kernel:
     jacobian = ca.densify(ca.jacobian(c, x))
     return Kernel(
         name=name,
@@ -53,6 +72,7 @@ def _kernel(name: str, equality: bool, x: Any, p: Any, c: Any, independent: Any 
         inputs=x.numel(),
         parameters=p.numel(),
         rows=c.numel(),
+        lengths=c.numel() if lengths is None else lengths,
         residual=ca.Function(f"{name}_residual", [x, p], [ca.densify(c)]),
         # transposed: CasADi stores columns, the solver reads rows
         jacobian=ca.Function(f"{name}_jacobian", [x, p], [ca.densify(c), jacobian.T]),
@@ -96,13 +116,6 @@ def tool_target(pose: Any, height: Any, pitch: Any, offset: Any, p: Any) -> tupl
     return centre - (reach + back) * x_axis - offset * z_axis, ca.horzcat(x_axis, y_axis, z_axis)
 
 
-PALM_GAP = 0.002
-"""Distance of the box's nearest corner from the palm (m)."""
-
-PAD_CENTRE = -0.02
-"""x of the centre of the fingertips' pads in the tool frame (m)."""
-
-
 def _hold() -> Kernel:
     """The gripper is at the box: tool frame of the arm = target of the grasp.
 
@@ -125,7 +138,7 @@ def _hold() -> Kernel:
     rodrigues = ca.vertcat(
         twist[2, 1] - twist[1, 2], twist[0, 2] - twist[2, 0], twist[1, 0] - twist[0, 1]
     ) / (1 + ca.trace(twist))
-    return _kernel("hold", True, x, p, c, ca.vertcat(c[:3], rodrigues))
+    return _kernel("hold", True, x, p, c, 3, ca.vertcat(c[:3], rodrigues))
 
 
 def _pads() -> Kernel:
@@ -217,7 +230,7 @@ def _carried() -> Kernel:
 
     before, after = relative(x[:3], x[3:6]), relative(x[6:9], x[9:12])
     turn = (x[11] - x[8]) - (x[5] - x[2])
-    return _kernel("carried", True, x, p, ca.vertcat(SCALE * (after - before), turn))
+    return _kernel("carried", True, x, p, ca.vertcat(SCALE * (after - before), turn), 2)
 
 
 @cache
@@ -244,7 +257,3 @@ def reach() -> Any:
     position, rotation = tool_target(x[:3], x[3] + x[10], x[4], x[5], x[11:15])
     solution = inverse(position, rotation, x[6], x[7], x[8], x[9])
     return ca.Function("reach", [x], [solution])
-
-
-RADII = np.array([sphere.radius for sphere in SPHERES])
-"""Radii (m) of the spheres."""

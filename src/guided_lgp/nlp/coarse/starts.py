@@ -23,8 +23,11 @@ from guided_lgp.nlp.results import Array
 from guided_lgp.scene import pr2
 
 _PANS = np.linspace(-0.65, 1.6, 10)
+"""Shoulder pans (rad) that are tried, left arm."""
 _PITCHES = np.pi * np.array([0.2, 0.35, 0.5, 0.65, 0.8])
+"""Pitches (rad) of the approach that are tried, from one end of the box over the top."""
 _PLACEMENTS = 6
+"""Placements drawn, of which the best to reach is taken."""
 _LIMITS = pr2.JOINT_LIMITS[:7]
 _HOME = pr2.HOME["pr2L"]
 
@@ -59,11 +62,8 @@ class Starts:
         fixed = 0 if known is None else len(known)
         if known is not None:
             values[:fixed] = known
-        draft = _Draft(self, formulation, generator, noise, values, fixed)
-        for step in formulation.steps:
-            for item in step:
-                draft.add(item)
-        draft.finish()
+        reach = _Reach(self._solver, self._torso)
+        _Draft(reach, formulation, generator, noise, values, fixed).fill()
         return values
 
 
@@ -72,15 +72,14 @@ class _Draft:
 
     def __init__(
         self,
-        starts: Starts,
+        reach: "_Reach",
         formulation: Formulation,
         generator: np.random.Generator,
         noise: float,
         values: Array,
         fixed: int,
     ) -> None:
-        self._solver = starts._solver
-        self._torso = starts._torso
+        self._reach = reach
         self._generator = generator
         self._noise = noise
         self._values = values
@@ -93,16 +92,16 @@ class _Draft:
         }
         self._formulation = formulation
 
-    def add(self, item: Mode | Placement | Separation | Posture) -> None:
-        if isinstance(item, Placement):
-            self._place(item)
-        elif isinstance(item, Separation):
-            if item.angle >= self._fixed:
-                self._values[item.angle] = self._separating(item)
-        elif isinstance(item, Posture) and item.free:
-            self._offer(item)
-
-    def finish(self) -> None:
+    def fill(self) -> None:
+        """Give every variable that is not known a value."""
+        for step in self._formulation.steps:
+            for item in step:
+                if isinstance(item, Placement):
+                    self._place(item)
+                elif isinstance(item, Posture) and item.free:
+                    self._offer(item)
+                elif isinstance(item, Separation) and item.angle >= self._fixed:
+                    self._values[item.angle] = self._separating(item)
         for mode in self._formulation.modes:
             self._hold(mode)
 
@@ -221,17 +220,31 @@ class _Draft:
     def _solutions(
         self, mode: Mode, poses: Array, legs: tuple[Leg, ...], pitches: Array
     ) -> tuple[Array, Array]:
+        return self._reach.solve(mode, float(self._values[mode.offset]), poses, legs, pitches)
+
+
+class _Reach:
+    """Closed-form inverse kinematics over a grid of poses, pitches and shoulder pans."""
+
+    def __init__(self, solver: Solver, torso: float) -> None:
+        self._solver = solver
+        self._torso = torso
+
+    def solve(
+        self, mode: Mode, offset: float, poses: Array, legs: tuple[Leg, ...], pitches: Array
+    ) -> tuple[Array, Array]:
         """Inverse kinematics of a contact and the ends of its legs.
 
         Returns:
-            joints (poses, pitches, 1 + legs, pans, 7) and costs (poses, pitches, pans).
+            joints (poses, pitches, 1 + legs, pans, 7) and costs (poses, pitches, pans): what is
+            missing to reach and beyond the joint limits, and some motion from the arm's side.
         """
         ends = np.array([(0.0, 0.0), *((leg.back, leg.up) for leg in legs)])
         shape = (len(poses), len(pitches), len(ends), 2 * len(_PANS))
         arguments = np.empty((*shape, 15))
         arguments[..., :4] = poses[:, None, None, None]
         arguments[..., 4] = pitches[:, None, None]
-        arguments[..., 5] = self._values[mode.offset]
+        arguments[..., 5] = offset
         arguments[..., 6] = np.tile(_PANS, 2)
         arguments[..., 7] = np.repeat([1.0, -1.0], len(_PANS))
         arguments[..., 8] = SIDES[mode.gripper]
