@@ -25,7 +25,7 @@ $(INSTALLED): requirements.lock pyproject.toml | $(VENV)/bin/pip
 repro: setup
 	git rev-parse --git-dir > /dev/null 2>&1 || dvc config --local core.no_scm true
 	dvc repro
-	guided-lgp mlflow sync
+	-guided-lgp mlflow sync
 	python -m guided_lgp.report.readme
 
 test: lint
