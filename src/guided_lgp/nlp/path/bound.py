@@ -17,7 +17,9 @@ from guided_lgp.scene.world import World
 _ITERATIONS = 150
 """Samples of the sampling planner per motion."""
 _QUERIES = 400
-"""Collision queries per action and coarse solution."""
+"""Collision queries per action (and for four more) and coarse solution."""
+_VISITS = 8
+"""Situations in which an action is begun, counted in the same way."""
 
 
 class PathBound:
@@ -68,7 +70,7 @@ class PathBound:
                 trouble,
                 number,
             )
-            limit = self._mover.queries + _QUERIES * (len(skeleton) + 2)
+            limit = self._mover.queries + _QUERIES * (len(skeleton) + 4)
             outcomes = self._search(options, limit, 0, options.start)
             if not isinstance(outcomes, list):
                 continue
@@ -112,6 +114,6 @@ class PathBound:
                 return [outcome, *rest]
             if rest < index:
                 return rest
-            if self._mover.queries > limit:
+            if self._mover.queries > limit or options.visits > _VISITS * (options.length + 4):
                 return -1
         return options.culprit(index)

@@ -91,6 +91,8 @@ class CollisionChecker:
             self._model, self._geometry, self._geometry_data
         )
         self._callback = pin.CollisionCallBackDefault(self._geometry, self._geometry_data, True)
+        self.queries = 0
+        """Calls of :meth:`first_collision` so far."""
         self._template = pin.neutral(self._model)
         self._template[self._coordinate("torso_lift_joint")] = scene.robot.torso
         self._plain = [i for i in range(14) if i not in CONTINUOUS]
@@ -138,6 +140,7 @@ class CollisionChecker:
 
         The configurations are visited from coarse to fine: ends, middle, quarters, …
         """
+        self.queries += 1
         coordinates = self.coordinates(q, fingers)
         for row in _coarse_to_fine(len(q)):
             if pin.computeCollisions(

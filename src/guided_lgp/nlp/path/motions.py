@@ -50,8 +50,11 @@ class Mover:
         self.arms = {gripper: Arm(scene, gripper) for gripper in GRIPPERS}
         self._checker = CollisionChecker(scene)
         self._iterations = iterations
-        self.queries = 0
+
+    @property
+    def queries(self) -> int:
         """Collision queries so far: the measure of effort."""
+        return self._checker.queries
 
     def collision(self, still: Still, q: Array) -> tuple[str, str] | None:
         """The first pair of bodies in collision along configurations (n, 7) of the moving arm."""
@@ -141,7 +144,6 @@ class Mover:
         return int(np.argmin(np.abs(np.sin((solutions - q) / 2)).sum(axis=1)))
 
     def _space(self, still: Still) -> JointSpace:
-        self.queries += 1
         self._checker.enter(still.mode)
         return JointSpace(self._checker, self.arms[still.mode.gripper], still.q, still.fingers)
 

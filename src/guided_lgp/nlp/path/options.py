@@ -130,6 +130,8 @@ class Options:
         self._arms = mover.arms
         self._skeleton = skeleton
         self.length = len(skeleton)
+        self.visits = 0
+        """Actions begun so far, in how many situations."""
         self._contacts = contacts
         self._trouble = trouble
         self._rng = np.random.default_rng(np.random.SeedSequence([7, seed]))
@@ -149,6 +151,7 @@ class Options:
 
     def of(self, index: int, situation: Situation) -> Iterator[Outcome]:
         """Ways to carry out an action, each free of collisions from rest to rest."""
+        self.visits += 1
         action = self._skeleton[index]
         for steps, presented in self._presented(index, situation):
             if action.instruction == "grasp":
