@@ -7,6 +7,7 @@ program itself. Heavy packages are imported by the commands that use them.
 import json
 import logging
 import os
+import signal
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -323,6 +324,7 @@ def _run_stage(stage: str, params_file: Path, *arguments: str) -> None:
 
     params = load_params(params_file)
     module = import_module(STAGES[stage])
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that the end is recorded
     with tracking.recorded("@".join([stage, *arguments]), params):
         module.run(params, Path.cwd(), *arguments)
 
