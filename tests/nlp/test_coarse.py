@@ -157,6 +157,12 @@ def test_an_extension_of_an_infeasible_prefix_is_infeasible(bound: CoarseBound) 
         assert result.failure == prefix.failure
 
 
+def test_a_prefix_of_another_skeleton_is_refused(bound: CoarseBound) -> None:
+    other = bound.solve(parse_skeleton("(grasp pr2L red)"))
+    with pytest.raises(ValueError, match="another skeleton"):
+        bound.solve(parse_skeleton("(grasp pr2L green) (place pr2L green red)"), other)
+
+
 def test_a_verdict_depends_on_scene_and_skeleton_only(bound: CoarseBound) -> None:
     for skeleton in _random_skeletons(SCENE, 4, 6, seed=8):
         fresh = CoarseBound(SCENE, 9).solve(skeleton)

@@ -64,7 +64,7 @@ def test_variables_stay_within_their_bounds() -> None:
     geometry = SceneGeometry(scene)
     formulation = Formulator(geometry, Margins()).build(parse_skeleton("(grasp pr2R red)"))
     program = formulation.program
-    start = np.concatenate([formulation.defaults, formulation.constants])
+    start = np.concatenate([program.target, formulation.constants])
     values = _compiled().solve(program, start, Settings()).values[: program.variables]
     assert np.all(values >= program.lower)
     assert np.all(values <= program.upper)

@@ -67,8 +67,13 @@ class CoarseBound:
         Args:
             skeleton: at least one action; each applicable after those before it.
             prefix: the result of this bound for ``skeleton[:-1]``; solved first if not given.
+
+        Raises:
+            ValueError: the prefix is the result for another skeleton.
         """
         started = time.perf_counter()
+        if prefix is not None and prefix.skeleton != skeleton[:-1]:
+            raise ValueError("the prefix belongs to another skeleton")
         if len(skeleton) > 1 and (
             prefix is None or (prefix.feasible and not isinstance(prefix, CoarseSolution))
         ):
@@ -98,7 +103,7 @@ class CoarseBound:
     def _search(self, skeleton: Skeleton, known: Array | None) -> CoarseSolution:
         """Start after start until one leads to a verified solution."""
         programs = _Programs(self._geometry, skeleton)
-        closest: Failure | None = None
+        failures: list[Failure] = []
         for attempt in range(self._tries):
             try:
                 result = self._attempt(programs, attempt, known)
@@ -110,10 +115,10 @@ class CoarseBound:
             if result.feasible:
                 return result
             assert result.failure is not None
-            if closest is None or result.failure.violation < closest.violation:
-                closest = result.failure
-        assert closest is not None
-        failure = replace(closest, tried=f"{self._tries} starts of the coarse bound")
+            failures.append(result.failure)
+        # the prefix is feasible: what fails late in the skeleton tells more
+        failure = min(failures, key=lambda failure: (-failure.action, failure.violation))
+        failure = replace(failure, tried=f"{self._tries} starts of the coarse bound")
         return CoarseSolution(skeleton, feasible=False, failure=failure, tries=self._tries)
 
     def _attempt(self, programs: "_Programs", attempt: int, known: Array | None) -> CoarseSolution:

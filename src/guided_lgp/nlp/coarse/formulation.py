@@ -178,8 +178,6 @@ class Formulation:
     """What each action adds, for the start."""
     contacts: tuple[Snapshot, ...]
     retreated: tuple[Snapshot, ...]
-    defaults: Array
-    """Values of the variables before a start is chosen."""
 
     def level(self, values: Array, where: Level) -> tuple[float, float, float, float]:
         """x, y, yaw and z of a level body."""
@@ -296,7 +294,7 @@ class Formulator:
             self._steps.append([])
             contacts.append(self._grasp(action) if action.table is None else self._place(action))
             self._state = successor(self._state, action)
-            self._retreat(action)
+            self._retreat()
             retreated.append(self._snapshot())
         return self._finish(tuple(contacts), tuple(retreated))
 
@@ -334,7 +332,7 @@ class Formulator:
         bodies = self._geometry.bodies
         height = bodies[table].half[2] + bodies[box].half[2]
         old = self._level[box]
-        new = Level(*self._plane(support), support.z, support.offset + height)
+        new = Level(*self._plane(), support.z, support.offset + height)
         carried = self._state.carried_by(box)
         moved: list[tuple[Level, Level]] = []
         del self._held[box]
@@ -342,7 +340,7 @@ class Formulator:
         for name in carried:
             above = self._level[name]
             rise = above.offset - old.offset
-            after = Level(*self._plane(support), new.z, new.offset + rise)
+            after = Level(*self._plane(), new.z, new.offset + rise)
             self._instance("carried", (*old.plane, *above.plane, *new.plane, *after.plane), ())
             self._name("carried", name, box)
             moved.append((above, after))
@@ -362,7 +360,7 @@ class Formulator:
                 self._clear(other, joints, box)
         return self._snapshot({gripper: posture.joints})
 
-    def _retreat(self, action: Action) -> None:
+    def _retreat(self) -> None:
         """Arms whose box carries nothing (any more) go to their side."""
         self._joints = {
             gripper: joints
@@ -489,7 +487,6 @@ class Formulator:
                 level.offset,
                 *self._geometry.bodies[name].half,
                 self._margins.clear,
-                0.0,
                 *RADII,
             ),
         )
@@ -497,7 +494,7 @@ class Formulator:
 
     # parts of a placement
 
-    def _plane(self, support: Level) -> tuple[int, int, int]:
+    def _plane(self) -> tuple[int, int, int]:
         return (
             self._variable(-3.0, 3.0, 1e-3, 0.5),
             self._variable(-3.0, 3.0, 1e-3, 0.0),
@@ -514,7 +511,7 @@ class Formulator:
         support = state.support_of(box)
         if support is None:
             return
-        stack = (box, *state.carried_by(box))[:STACK]
+        stack = (box, *state.carried_by(box))[:STACK]  # of higher towers, verification judges
         key = (support, *((name, self._level[name].plane) for name in stack))
         if key not in self._balanced and any(
             slot >= 0 for name in stack for slot in self._level[name].plane
@@ -612,7 +609,6 @@ class Formulator:
         inputs = np.where(inputs < 0, count - 1 - inputs, inputs).astype(np.intc)
         order = np.empty(count, dtype=np.intc)
         order[np.argsort(self._shared, kind="stable")] = np.arange(count)
-        target = np.array(self._target)
         program = Program(
             kernel=np.array(self._kernel, dtype=np.intc),
             input_start=_column(starts, 0),
@@ -621,7 +617,7 @@ class Formulator:
             row_start=_column(starts, 2),
             parameters=np.array(self._parameters),
             weight=np.array(self._weight),
-            target=target,
+            target=np.array(self._target),
             lower=np.array(self._lower),
             upper=np.array(self._upper),
             order=order,
@@ -634,7 +630,6 @@ class Formulator:
             steps=tuple(map(tuple, self._steps)),
             contacts=contacts,
             retreated=retreated,
-            defaults=target,
         )
 
 

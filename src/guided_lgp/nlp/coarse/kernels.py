@@ -161,12 +161,11 @@ def _pads() -> Kernel:
 
 def _clear() -> Kernel:
     """The spheres of an arm keep their distance from a level box or table."""
-    x, p = ca.SX.sym("x", 11), ca.SX.sym("p", 8 + len(SPHERES))
+    x, p = ca.SX.sym("x", 11), ca.SX.sym("p", 7 + len(SPHERES))
     q, pose, z = x[:7], x[7:10], x[10]
-    side, torso, z_offset, half, margin, turn = p[0], p[1], p[2], p[3:6], p[6], p[7]
+    side, torso, z_offset, half, margin = p[0], p[1], p[2], p[3:6], p[6]
     arm = arm_pose(q, side, torso)
-    heading = pose[2] + turn
-    cosine, sine = ca.cos(heading), ca.sin(heading)
+    cosine, sine = ca.cos(pose[2]), ca.sin(pose[2])
     rows = []
     for i in range(len(SPHERES)):
         d = arm.spheres[:, i] - ca.vertcat(pose[0], pose[1], z + z_offset)
@@ -174,7 +173,7 @@ def _clear() -> Kernel:
         outside = ca.fabs(local) - half
         reach = ca.sqrt(ca.sumsqr(ca.fmax(outside, 0)) + 1e-12)
         inside = ca.fmin(ca.fmax(ca.fmax(outside[0], outside[1]), outside[2]), 0)
-        rows.append(SCALE * (reach + inside - p[8 + i] - margin))
+        rows.append(SCALE * (reach + inside - p[7 + i] - margin))
     return _kernel("clear", False, x, p, ca.vertcat(*rows))
 
 

@@ -58,7 +58,7 @@ class Starts:
         Returns:
             values of the variables, then the constants.
         """
-        values = np.concatenate([formulation.defaults, formulation.constants])
+        values = np.concatenate([formulation.program.target, formulation.constants])
         fixed = 0 if known is None else len(known)
         if known is not None:
             values[:fixed] = known
