@@ -212,6 +212,9 @@ def test_sync_joins_the_execution_with_the_same_parameters(clone: Path) -> None:
 
 
 def test_sync_refuses_what_dvc_did_not_write(clone: Path) -> None:
+    other = PARAMS.generate_scenes.model_copy(update={"seed_test": 77})
+    with pytest.raises(InputError, match=r"generate_scenes\.seed_test: is not 2, with which"):
+        tracking.sync(PARAMS.model_copy(update={"generate_scenes": other}))
     (clone / "reports" / "training" / "place.json").write_text("{}")
     with pytest.raises(InputError, match=r"place\.json: is not the one that dvc\.lock names"):
         tracking.sync(PARAMS)

@@ -25,6 +25,7 @@ import yaml
 
 from guided_lgp.errors import InputError
 from guided_lgp.params import Params
+from guided_lgp.paths import PARAMS
 
 Value = TypeVar("Value")
 
@@ -50,6 +51,8 @@ class StageFiles:
     dependencies: tuple[str, ...]
     outputs: Mapping[str, str | None]
     """Paths with their md5, where known."""
+    parameters: Mapping[str, Any]
+    """Values by dotted name."""
 
     @classmethod
     def of(cls, address: str, entry: Mapping[str, Any]) -> "StageFiles":
@@ -62,6 +65,7 @@ class StageFiles:
             key=sha256(text.encode()).hexdigest(),
             dependencies=tuple(sorted(dependencies)),
             outputs={item["path"]: item.get("md5") for item in entry.get("outs", ())},
+            parameters=entry.get("params", {}).get(PARAMS.name, {}),
         )
 
 
@@ -122,7 +126,7 @@ def sync(params: Params) -> tuple[list[str], list[str]]:
         The stages recorded now, and those that had been recorded before.
 
     Raises:
-        InputError: there is no ``dvc.lock``, or an output is not the one that it names.
+        InputError: there is no ``dvc.lock``, or an output or a parameter is not the one in it.
     """
     lock = Path("dvc.lock")
     if not lock.is_file():
@@ -132,6 +136,7 @@ def sync(params: Params) -> tuple[list[str], list[str]]:
     known = _recorded_keys(prepare())
     missing = [stage for stage in stages if stage.key not in known]
     for stage in missing:
+        _check_parameters(stage, params)
         _check_outputs(stage)
     for stage in missing:
         run = _Run.start(stage.address, params, _execution_of_same_state(params), replayed=True)
@@ -348,6 +353,14 @@ def _running_stage(address: str) -> StageFiles:
         stage = repo.stage.load_one(name=address)
         stage.save_deps()
         return StageFiles.of(address, to_single_stage_lockfile(stage))
+
+
+def _check_parameters(stage: StageFiles, params: Params) -> None:
+    current = flatten(params.model_dump())
+    for name, value in flatten(stage.parameters).items():
+        if current.get(name) != value:
+            fault = f"is not {value!r}, with which {stage.address} ran"
+            raise InputError(f"{PARAMS}: {name}", fault, "dvc repro first")
 
 
 def _check_outputs(stage: StageFiles) -> None:
