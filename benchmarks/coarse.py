@@ -7,11 +7,13 @@ import json
 import sys
 import time
 from dataclasses import dataclass
+from pathlib import Path
 from statistics import fmean, median
 from typing import Any
 
 import numpy as np
 
+from guided_lgp import parallel
 from guided_lgp.logic import Skeleton, applicable_actions, successor
 from guided_lgp.nlp.coarse import CoarseBound
 from guided_lgp.nlp.coarse.formulation import Formulator, Margins, SceneGeometry
@@ -19,9 +21,12 @@ from guided_lgp.nlp.coarse.ipopt import Ipopt
 from guided_lgp.nlp.coarse.solver import Settings, default_solver
 from guided_lgp.nlp.coarse.starts import Starts
 from guided_lgp.nlp.results import CoarseResult
+from guided_lgp.params import load_params
+from guided_lgp.paths import PARAMS
 from guided_lgp.scene import Scene
 from guided_lgp.scene.generate import generate
 
+ROOT = Path(__file__).parents[1]
 LENGTHS = (2, 4, 6, 8, 10)
 SEED = 20_001
 """Of scenes and sequences; no stage of the pipeline uses it."""
@@ -44,11 +49,25 @@ class Sequence:
 
 def measure(count: int = 100, setup: str = "a") -> dict[str, Any]:
     """Figures per length K over ``count`` random sequences; times in ms on one core."""
-    scenes = generate(setup, CONFIGURATIONS, SEED, "bench").scenes
-    return {str(length): _length(length, count, scenes) for length in LENGTHS}
+    tasks = [Task(length, count, setup) for length in LENGTHS]
+    settings = load_params(ROOT / PARAMS).parallel
+    figures = parallel.run(run_task, tasks, settings, "coarse bound and IPOPT")
+    return dict(zip(map(str, LENGTHS), figures, strict=True))
 
 
-def _length(length: int, count: int, scenes: tuple[Scene, ...]) -> dict[str, Any]:
+@dataclass(frozen=True)
+class Task:
+    """``count`` random sequences of one length."""
+
+    length: int
+    count: int
+    setup: str
+
+
+def run_task(task: Task) -> dict[str, Any]:
+    """Figures of one length."""
+    length, count = task.length, task.count
+    scenes = generate(task.setup, CONFIGURATIONS, SEED, "bench").scenes
     rng = np.random.default_rng([SEED, length])
     sequences: list[Sequence] = []
     for index, scene in enumerate(scenes):

@@ -6,19 +6,25 @@ Needs nothing that the pipeline makes: python benchmarks/path.py [sequences per 
 import json
 import sys
 import time
-from statistics import median
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import fmean, median
 from typing import Any
 
 import numpy as np
 
+from guided_lgp import parallel
 from guided_lgp.logic import Goal, Skeleton, State, applicable_actions, successor
 from guided_lgp.nlp.coarse import CoarseBound
 from guided_lgp.nlp.path import PathBound
 from guided_lgp.nlp.physics import execute
 from guided_lgp.nlp.results import CoarseResult
+from guided_lgp.params import load_params
+from guided_lgp.paths import PARAMS
 from guided_lgp.scene import Scene
 from guided_lgp.scene.generate import generate
 
+ROOT = Path(__file__).parents[1]
 LENGTHS = (2, 4, 6, 8, 10)
 SEED = 20_000
 """Of scenes and sequences; no stage of the pipeline uses it."""
@@ -26,47 +32,77 @@ CONFIGURATIONS = 10
 TRIES, SOLUTIONS = 9, 8
 
 
-def measure(count: int = 100, physics: bool = True) -> dict[str, Any]:
-    """Figures per length K over ``count`` random coarse-feasible sequences of setup a."""
+@dataclass(frozen=True)
+class Sample:
+    """What became of one random sequence; ``time_s`` of the path bound, verification included."""
+
+    verified: bool
+    goals_hold: bool
+    time_s: float
+
+
+def measure(count: int = 100) -> dict[str, Any]:
+    """Figures per length K over ``count`` random coarse-feasible sequences of setup a.
+
+    Every sequence has one core to itself.
+    """
     scenes = generate("a", CONFIGURATIONS, SEED, "bench").scenes
-    coarse = [CoarseBound(scene, TRIES) for scene in scenes]
-    paths = [PathBound(s, c, SOLUTIONS) for s, c in zip(scenes, coarse, strict=True)]
+    tasks = [
+        Task(length, number, scene, len(range(number, count, CONFIGURATIONS)))
+        for length in reversed(LENGTHS)  # the longest first
+        for number, scene in enumerate(scenes)
+    ]
+    settings = load_params(ROOT / PARAMS).parallel
+    parts = parallel.run(run_task, tasks, settings, "path bound and physics")
+    samples: dict[int, list[Sample]] = {length: [] for length in LENGTHS}
+    for task, part in zip(tasks, parts, strict=True):
+        samples[task.length].extend(part)
+    return {str(length): _figures(samples[length]) for length in LENGTHS}
+
+
+@dataclass(frozen=True)
+class Task:
+    """Some random sequences of one length in one scene."""
+
+    length: int
+    number: int
+    scene: Scene
+    count: int
+
+
+def run_task(task: Task) -> list[Sample]:
+    """Plan and carry out the sequences of a task."""
+    rng = np.random.default_rng([SEED, task.length, task.number])
+    coarse = CoarseBound(task.scene, TRIES)
+    path = PathBound(task.scene, coarse, SOLUTIONS)
+    return [_sample(task.length, task.scene, coarse, path, rng) for _ in range(task.count)]
+
+
+def _sample(
+    length: int, scene: Scene, coarse: CoarseBound, path: PathBound, rng: np.random.Generator
+) -> Sample:
+    start = _feasible(length, scene, coarse, rng)
+    began = time.perf_counter()
+    result = path.solve(start)
+    elapsed = time.perf_counter() - began
+    if result.trajectory is None:
+        print(f"K={length} {scene.name}: {result.failure}", file=sys.stderr)
+        return Sample(verified=False, goals_hold=False, time_s=elapsed)
+    goals = _goals(scene.state, result.skeleton)
+    report = execute(scene, goals, result.skeleton, result.trajectory)
+    return Sample(verified=True, goals_hold=report.success, time_s=elapsed)
+
+
+def _figures(samples: list[Sample]) -> dict[str, Any]:
+    verified = [sample for sample in samples if sample.verified]
+    times = [sample.time_s for sample in samples]
     return {
-        str(length): _length(length, count, scenes, coarse, paths, physics) for length in LENGTHS
-    }
-
-
-def _length(
-    length: int,
-    count: int,
-    scenes: tuple[Scene, ...],
-    coarse: list[CoarseBound],
-    paths: list[PathBound],
-    physics: bool,
-) -> dict[str, Any]:
-    rng = np.random.default_rng([SEED, length])
-    verified, successes, times = 0, 0, []
-    for number in range(count):
-        index = number % len(scenes)
-        start = _feasible(length, scenes[index], coarse[index], rng)
-        began = time.perf_counter()
-        result = paths[index].solve(start)
-        times.append(time.perf_counter() - began)
-        if result.trajectory is None:
-            print(f"K={length} {scenes[index].name}: {result.failure}", file=sys.stderr)
-            continue
-        verified += 1
-        if physics:
-            goals = _goals(scenes[index].state, result.skeleton)
-            report = execute(scenes[index], goals, result.skeleton, result.trajectory)
-            successes += report.success
-    figures = {
-        "n": count,
-        "path_verified_share": verified / count,
+        "n": len(samples),
+        "path_verified_share": len(verified) / len(samples),
         "path_median_s": median(times),
         "path_max_s": max(times),
+        "physics_success_share": fmean(sample.goals_hold for sample in verified),
     }
-    return figures | ({"physics_success_share": successes / verified} if physics else {})
 
 
 def _feasible(
