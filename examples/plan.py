@@ -5,7 +5,7 @@ from pathlib import Path
 from guided_lgp import load_scene, plan
 
 scene = load_scene(Path(__file__).parent / "three_boxes.json")
-result = plan(scene, ["(on red green)", "(held blue)"], planner="breadth-first")
+result = plan(scene, ["(on red green)", "(held blue)"])
 if result.path is None:
     print("no plan:", result.explanation)
 else:
