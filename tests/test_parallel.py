@@ -3,10 +3,14 @@
 import logging
 import os
 import pickle
+import signal
+import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from pathlib import Path
 
+import psutil
 import pytest
 
 from guided_lgp import parallel
@@ -43,6 +47,52 @@ def bad_input(_: int) -> int:
 
 def die(_: int) -> int:
     os._exit(1)
+
+
+def keep_busy(folder: Path) -> None:
+    """Leave a file named by the process, then compute for a minute."""
+    (folder / str(os.getpid())).touch()
+    end = time.monotonic() + 60
+    while time.monotonic() < end:
+        pass
+
+
+FAN_OUT = """
+from pathlib import Path
+from test_parallel import keep_busy
+from guided_lgp.parallel import run
+from guided_lgp.params import Parallel
+run(keep_busy, 2 * [Path({folder!r})], Parallel(backend={backend!r}, workers=2), "busy")
+"""
+STAGE = """
+import os, signal, sys
+from guided_lgp.parallel import end_with_parent
+signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
+end_with_parent(os.getppid(), signal.SIGTERM)
+"""
+STARTER = "import subprocess, sys; subprocess.run([sys.executable, '-c', sys.argv[1]])"
+
+
+def start(folder: Path, *words: str) -> tuple[subprocess.Popen[bytes], list[psutil.Process]]:
+    """Start Python with a fan-out of `keep_busy` below it, and wait until that is under way."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", *words],
+        env=os.environ | {"PYTHONPATH": str(Path(__file__).parent)},
+        stderr=subprocess.DEVNULL,
+    )
+    wait_until(lambda: len(list(folder.iterdir())) == 2, 30)
+    return process, psutil.Process(process.pid).children(recursive=True)
+
+
+def wait_until(condition: Callable[[], bool], limit: float) -> None:
+    end = time.monotonic() + limit
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.05)
+
+
+def gone(process: psutil.Process) -> bool:
+    return not process.is_running() or process.status() == psutil.STATUS_ZOMBIE
 
 
 @pytest.mark.parametrize("settings", [ONE, TWO])
@@ -88,6 +138,26 @@ def test_input_errors_survive_pickling() -> None:
 def test_a_killed_worker_is_reported() -> None:
     with pytest.raises(WorkerError, match="a worker process was killed"):
         run(die, range(2), TWO, "solve")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.parametrize("backend", ["loky", "dask"])
+def test_workers_end_with_the_process_that_started_them(
+    backend: str, number: signal.Signals, tmp_path: Path
+) -> None:
+    parent, below = start(tmp_path, FAN_OUT.format(folder=str(tmp_path), backend=backend))
+    assert {int(file.name) for file in tmp_path.iterdir()} <= {process.pid for process in below}
+    parent.send_signal(number)
+    assert parent.wait(20) != 0
+    wait_until(lambda: all(map(gone, below)), 5)
+
+
+def test_a_stage_and_its_workers_end_with_the_process_that_runs_stages(tmp_path: Path) -> None:
+    stage = STAGE + FAN_OUT.format(folder=str(tmp_path), backend="loky")
+    runner, below = start(tmp_path, STARTER, stage)
+    runner.kill()
+    runner.wait(5)
+    wait_until(lambda: all(map(gone, below)), 5)
 
 
 def test_progress_in_a_pipe_is_a_line_per_milestone(caplog: pytest.LogCaptureFixture) -> None:

@@ -319,12 +319,14 @@ def mlflow_sync() -> None:
 
 def _run_stage(stage: str, params_file: Path, *arguments: str) -> None:
     """Check all parameters, then run a stage and record it."""
-    from guided_lgp import tracking
+    from guided_lgp import parallel, tracking
     from guided_lgp.params import load_params
 
     params = load_params(params_file)
     module = import_module(STAGES[stage])
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that the end is recorded
+    if "DVC_STAGE" in os.environ:
+        parallel.end_with_parent(os.getppid(), signal.SIGTERM)
     with tracking.recorded("@".join([stage, *arguments]), params):
         module.run(params, Path.cwd(), *arguments)
 

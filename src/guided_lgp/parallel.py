@@ -2,7 +2,9 @@
 
 import logging
 import os
+import signal
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
@@ -18,6 +20,8 @@ SCHEDULER_VARIABLE = "DASK_SCHEDULER_ADDRESS"
 SCHEDULER_TIMEOUT_S = 10.0
 MILESTONES = 10
 """Lines of progress that one fan-out writes where there is no terminal."""
+WATCH_S = 0.5
+"""Time between two looks at whether the parent process is there."""
 
 logger = logging.getLogger(__name__)
 
@@ -69,7 +73,12 @@ def _results(
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 
     workers = min(settings.workers, max(len(tasks), 1))
-    backend: dict[str, Any] = {"backend": "loky", "inner_max_num_threads": 1}
+    backend: dict[str, Any] = {
+        "backend": "loky",
+        "inner_max_num_threads": 1,
+        "initializer": end_with_parent,
+        "initargs": (os.getpid(), signal.SIGKILL),
+    }
     if settings.backend == "dask":
         stack.enter_context(_dask_client(workers))
         backend, workers = {"backend": "dask"}, -1
@@ -85,6 +94,25 @@ def _results(
         raise WorkerError(
             f"{description}: a worker process was killed, most often for lack of memory"
         ) from error
+
+
+def end_with_parent(parent: int, number: signal.Signals) -> None:
+    """Make this process end when its parent has died, whatever ended that.
+
+    Nobody waits for its results any more, and nothing else tells it: a worker would finish its
+    task, and a stage whose DVC was killed all of them.
+
+    Args:
+        parent: process id of the parent, which may be dead by now.
+        number: signal that this process is to receive.
+    """
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(WATCH_S)
+        os.kill(os.getpid(), number)
+
+    threading.Thread(target=watch, name="end with parent", daemon=True).start()
 
 
 def _call(function: Callable[[Task], Result], task: Task, label: str) -> Result:
