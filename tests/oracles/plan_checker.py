@@ -1,0 +1,764 @@
+"""A checker of plan files, written from the description of their format alone.
+
+It shares no code with the planner: kinematics by pinocchio on the URDF of ``example-robot-data``,
+collisions by PyBullet between the convex hulls of its meshes, each placed where pinocchio puts it,
+and the boxes carried along as the attachments say. ``check(document)`` returns the faults.
+
+Conventions: lengths in m, angles in rad, times in s; poses are homogeneous matrices (..., 4, 4) in
+the world, whose floor carries ``base_footprint`` at the scene's ``robot.base`` (x, y, yaw). A *row*
+is an index into ``path.times``; *interval* i lies between rows i and i + 1, where joints move
+linearly.
+"""
+
+import itertools
+import re
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from importlib.metadata import distribution
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+import pybullet
+from scipy.spatial import ConvexHull
+from scipy.spatial.transform import Rotation
+
+SHARE = Path(str(distribution("example-robot-data").locate_file("cmeel.prefix/share")))
+PR2 = SHARE / "example-robot-data" / "robots" / "pr2_description"
+URDF, SRDF = PR2 / "urdf" / "pr2.urdf", PR2 / "srdf" / "pr2.srdf"
+SIDES = {"pr2L": "l", "pr2R": "r"}
+
+PENETRATION = 0.005  # allowed everywhere outside the declared contacts
+IN_HAND = 0.015  # allowed within them: the hull of a finger fills the hollow of its inner side
+STEP = 0.01  # of the fastest link point between two collision checks
+ON_SUPPORT = 0.005  # a corner of a standing box may be off the plane of its support by this much
+TABLE_THICKNESS = 0.03  # a scene gives the top alone; below a slab, links are free to pass
+HULL_MARGIN = 0.001  # by which PyBullet inflates a hull
+APPROACH = 0.12  # length of the straight motion to or from a box on which fingers may touch it
+AT_BOX = 0.005  # distance of a finger from the box that it holds
+AWAY = 0.005  # a tool this far from where it grasped or released has left the box
+OPENED = 0.01  # by which the fingers must be wider beside a box than on it, rad
+SAME_POSITION, SAME_ANGLE = 1e-3, 1e-2  # keyframes and path tell the same
+ROUNDING = 1e-3  # relative in velocities, absolute in joint positions
+
+Kind = (
+    Literal["format", "logic", "attachment", "order", "keyframe", "goal"]
+    | Literal["limit", "velocity", "mimic", "grasp", "fingers", "support", "collision"]
+)
+
+
+class Fault(NamedTuple):
+    """What is wrong, at which row of the path (None: not tied to one), in words."""
+
+    kind: Kind
+    row: int | None
+    text: str
+
+
+class Attachment(NamedTuple):
+    box: str
+    gripper: str
+    start: int
+    end: int
+
+
+class Keyframe(NamedTuple):
+    q: np.ndarray  # (joints,)
+    boxes: dict[str, tuple[np.ndarray, float]]  # position and yaw
+
+
+@dataclass(frozen=True)
+class Plan:
+    boxes: dict[str, dict[str, Any]]
+    tables: dict[str, dict[str, Any]]
+    base: tuple[float, float, float]
+    torso: float
+    goals: list[tuple[str, ...]]
+    actions: list[tuple[str, ...]]
+    joints: list[str]
+    fixed: dict[str, float]
+    times: np.ndarray  # (n,)
+    q: np.ndarray  # (n, joints)
+    attachments: list[Attachment]
+    keyframes: list[Keyframe]
+
+
+class Motion(NamedTuple):
+    """Poses (n, 4, 4) by name at every row: hulls of links, tool frames by gripper, boxes."""
+
+    links: dict[str, np.ndarray]
+    tools: dict[str, np.ndarray]
+    boxes: dict[str, np.ndarray]
+
+
+def check(document: Mapping[str, Any]) -> list[Fault]:
+    """The faults of a plan; none: anyone can carry it out and the goals hold at its end."""
+    try:
+        plan = _read(document)
+    except (KeyError, TypeError, ValueError, IndexError) as error:
+        return [Fault("format", None, f"{type(error).__name__}: {error}")]
+    robot = Robot(plan)
+    faults = [*robot.unknown(), *_legal(plan)]
+    if faults:
+        return faults
+    faults += [*_limits(plan, robot), *_velocities(plan, robot), *_mimics(plan)]
+    links, tools = robot.forward(plan.q)
+    motion = Motion(links, tools, _carry(plan, tools))
+    try:
+        events = _events(plan)
+    except _UnmatchedError as unmatched:
+        return [*faults, unmatched.fault]
+    return [
+        *faults,
+        *_carriers(plan, events),
+        *_standing(plan, events, motion),
+        *_grasps(plan, robot, events, motion),
+        *_fingers(plan, events, motion),
+        *_keyframes(plan, events, motion),
+        *_collisions(plan, robot, events, motion),
+        *_goals(plan, events),
+    ]
+
+
+# --- the file ------------------------------------------------------------------------------------
+
+
+def _atom(text: str, **arity: int) -> tuple[str, ...]:
+    found = re.fullmatch(r"\((\w+)((?: \S+)+)\)", text)
+    words = (found[1], *found[2].split()) if found else ()
+    if not words or arity.get(words[0]) != len(words) - 1:
+        raise ValueError(f"{text!r} is none of {', '.join(arity)}")
+    return words
+
+
+def _read(document: Mapping[str, Any]) -> Plan:
+    scene, path = document["scene"], document["path"]
+    x, y, yaw = map(float, scene["robot"]["base"])
+    plan = Plan(
+        boxes={box["name"]: box for box in scene["boxes"]},
+        tables={table["name"]: table for table in scene["tables"]},
+        base=(x, y, yaw),
+        torso=float(scene["robot"]["torso"]),
+        goals=[_atom(goal, held=1, on=2) for goal in document["objective"]],
+        actions=[_atom(action, grasp=2, place=3) for action in document["actions"]],
+        joints=list(document["joint_names"]),
+        fixed={name: float(value) for name, value in document["fixed_joints"].items()},
+        times=np.array(path["times"], float),
+        q=np.array(path["q"], float),
+        attachments=_merged(
+            Attachment(a["box"], a["gripper"], int(a["start"]), int(a["end"]))
+            for a in path["attachments"]
+        ),
+        keyframes=[
+            Keyframe(
+                np.array(keyframe["q"], float),
+                {
+                    name: (np.array(pose["position"], float), float(pose["yaw"]))
+                    for name, pose in keyframe["boxes"].items()
+                },
+            )
+            for keyframe in document["keyframes"]
+        ],
+    )
+    rows = len(plan.times)
+    if plan.q.shape != (rows, len(plan.joints)) or rows < 2:
+        raise ValueError(f"path.q has shape {plan.q.shape} for {rows} times")
+    if not (np.isfinite(plan.q).all() and np.isfinite(plan.times).all()):
+        raise ValueError("path: a number is not finite")
+    if (np.diff(plan.times) <= 0).any():
+        raise ValueError("path.times do not increase")
+    if len(set(plan.joints)) < len(plan.joints) or set(plan.joints) & set(plan.fixed):
+        raise ValueError("a joint is listed twice")
+    if plan.fixed.get("torso_lift_joint", 0.0) != plan.torso:
+        raise ValueError("torso_lift_joint is not at the scene's torso")
+    grounded = set(plan.tables)
+    for _ in plan.boxes:
+        grounded |= {name for name, box in plan.boxes.items() if box["on"] in grounded}
+    if not plan.boxes.keys() <= grounded:
+        raise ValueError("a box of the scene stands on nothing")
+    for box, gripper, start, end in plan.attachments:
+        if box not in plan.boxes or gripper not in SIDES or not 0 <= start < end < rows:
+            raise ValueError(f"no such attachment: {box} {gripper} {start} {end}")
+    if len(plan.keyframes) != len(plan.actions):
+        raise ValueError(f"{len(plan.keyframes)} keyframes for {len(plan.actions)} actions")
+    for keyframe in plan.keyframes:
+        if keyframe.q.shape != plan.q[0].shape or keyframe.boxes.keys() != plan.boxes.keys():
+            raise ValueError("a keyframe lacks a joint or a box")
+    return plan
+
+
+def _merged(attachments: Iterable[Attachment]) -> list[Attachment]:
+    """In order of their starts; one that goes on where another of the same pair ends, joined."""
+    result: list[Attachment] = []
+    for new in sorted(attachments, key=lambda a: (a.box, a.start)):
+        if result and result[-1][:2] == new[:2] and result[-1].end == new.start:
+            result[-1] = result[-1]._replace(end=new.end)
+        else:
+            result.append(new)
+    return sorted(result, key=lambda a: (a.start, a.box))
+
+
+def _scene_pose(plan: Plan, name: str) -> np.ndarray:
+    """The centre of a box, or the centre of the top of a table."""
+    item = plan.boxes.get(name) or plan.tables[name]
+    return _planar(*item["position"], item.get("yaw", 0.0))
+
+
+def _planar(x: float, y: float, z: float, yaw: float) -> np.ndarray:
+    pose = np.eye(4)
+    pose[:3, :3] = Rotation.from_euler("z", yaw).as_matrix()
+    pose[:3, 3] = x, y, z
+    return pose
+
+
+# --- the actions: legal, and told by the attachments ---------------------------------------------
+
+
+@dataclass
+class State:
+    """Who holds what, and what stands on what."""
+
+    support: dict[str, str]  # of every box that is not held
+    holds: dict[str, str]  # gripper: box
+
+    def chain(self, item: str) -> list[str]:
+        """The item, what it stands on, and so on down."""
+        down = [item]
+        while down[-1] in self.support:
+            down.append(self.support[down[-1]])
+        return down
+
+    def carrier(self, box: str) -> str | None:
+        """The gripper that moves the box, directly or through the boxes below it."""
+        root = self.chain(box)[-1]
+        return next((gripper for gripper, held in self.holds.items() if held == root), None)
+
+    def carried(self, item: str) -> list[str]:
+        """The boxes that stand on the item, directly or through others."""
+        return [box for box in self.support if item in self.chain(box)[1:]]
+
+    def apply(self, action: tuple[str, ...]) -> None:
+        kind, gripper, box, *table = action
+        if kind == "grasp":
+            self.holds[gripper] = box
+            del self.support[box]
+        else:
+            del self.holds[gripper]
+            self.support[box] = table[0]
+
+
+def _start(plan: Plan) -> State:
+    return State({name: box["on"] for name, box in plan.boxes.items()}, {})
+
+
+def _legal(plan: Plan) -> Iterator[Fault]:
+    state = _start(plan)
+    for action in plan.actions:
+        kind, gripper, box, *table = action
+        names = {gripper} <= SIDES.keys() and {box} <= plan.boxes.keys()
+        if not names or not set(table) <= plan.boxes.keys() | plan.tables.keys():
+            why = "a name is not in the scene"
+        elif kind == "grasp" and gripper in state.holds:
+            why = f"{gripper} is not free"
+        elif kind == "grasp" and box in state.holds.values():
+            why = f"{box} is held already"
+        elif kind == "place" and state.holds.get(gripper) != box:
+            why = f"{gripper} does not hold {box}"
+        elif kind == "place" and box in state.chain(table[0]):
+            why = f"{table[0]} stands on {box}"
+        else:
+            state.apply(action)
+            continue
+        yield Fault("logic", None, f"{_text(action)}: {why}")
+        return
+
+
+def _text(words: Sequence[str]) -> str:
+    return f"({' '.join(words)})"
+
+
+class _UnmatchedError(Exception):
+    def __init__(self, fault: Fault) -> None:
+        super().__init__(fault.text)
+        self.fault = fault
+
+
+@dataclass(frozen=True)
+class Event:
+    """An action takes effect at a row; the attachment is that of the box in the gripper."""
+
+    action: tuple[str, ...]
+    row: int
+    attachment: Attachment
+
+
+def _events(plan: Plan) -> list[Event]:
+    """When each action takes effect, in the order of the actions.
+
+    A grasp begins the first attachment of its pair from then on, the next place of its gripper
+    ends it. Other attachments must belong to boxes that ride on a held one.
+    """
+    events: list[Event] = []
+    held: dict[str, Attachment] = {}
+    now, last = 0, len(plan.times) - 1
+    for action in plan.actions:
+        kind, gripper, box, *_ = action
+        if kind == "grasp":
+            mine = [a for a in plan.attachments if a[:2] == (box, gripper)]
+            later = [a for a in mine if a.start >= now]
+            if not later:
+                text = f"{_text(action)}: no attachment from row {now} on"
+                raise _UnmatchedError(Fault("order" if mine else "attachment", now, text))
+            held[gripper], row = later[0], later[0].start
+        else:
+            row = held[gripper].end
+            if row < now:
+                text = f"{_text(action)}: takes effect before the action before it"
+                raise _UnmatchedError(Fault("order", row, text))
+        events.append(Event(action, row, held[gripper]))
+        if kind == "place":
+            del held[gripper]
+        now = row
+    for gripper, attachment in held.items():
+        if attachment.end != last:
+            text = f"{attachment.box} leaves {gripper} without being placed"
+            raise _UnmatchedError(Fault("attachment", attachment.end, text))
+    return events
+
+
+def _states(plan: Plan, events: Sequence[Event]) -> list[State]:
+    """The state from every row on."""
+    state, states = _start(plan), []
+    pending = list(events)
+    for row in range(len(plan.times)):
+        while pending and pending[0].row <= row:
+            state = State(dict(state.support), dict(state.holds))
+            state.apply(pending.pop(0).action)
+        states.append(state)
+    return states
+
+
+def _carriers(plan: Plan, events: Sequence[Event]) -> Iterator[Fault]:
+    """What the gripper carries by the actions, and nothing else, is rigid in it."""
+    states = _states(plan, events)[:-1]
+    for box in plan.boxes:
+        for interval, state in enumerate(states):
+            told = [a.gripper for a in plan.attachments if a.box == box and _spans(a, interval)]
+            expected = [gripper for gripper in [state.carrier(box)] if gripper]
+            if told != expected:
+                text = f"{box} is rigid in {told or 'nothing'}, by the actions in {expected}"
+                yield Fault("attachment", interval, text)
+                break
+
+
+def _spans(attachment: Attachment, interval: int) -> bool:
+    return attachment.start <= interval < attachment.end
+
+
+def _goals(plan: Plan, events: Sequence[Event]) -> Iterator[Fault]:
+    state = _start(plan)
+    for event in events:
+        state.apply(event.action)
+    for goal in plan.goals:
+        kind, box, *table = goal
+        holds = box in state.holds.values() if kind == "held" else state.support.get(box) in table
+        if not holds:
+            yield Fault("goal", len(plan.times) - 1, f"{_text(goal)} does not hold at the end")
+
+
+# --- the robot -----------------------------------------------------------------------------------
+
+
+class Robot:
+    """The PR2 of the package: limits, hulls of its links, and where they are."""
+
+    def __init__(self, plan: Plan) -> None:
+        self.plan = plan
+        self.model = pin.buildModelFromUrdf(str(URDF))
+        self.geometry = pin.buildGeomFromUrdf(
+            self.model, str(URDF), pin.GeometryType.COLLISION, package_dirs=[str(SHARE)]
+        )
+        self.hulls = {
+            self.model.frames[item.parentFrame].name: _vertices(item)
+            for item in self.geometry.geometryObjects
+        }
+        self.base = _planar(*plan.base[:2], 0.0, plan.base[2])
+
+    def unknown(self) -> Iterator[Fault]:
+        for name in [*self.plan.joints, *self.plan.fixed]:
+            if not self.model.existJointName(name):
+                yield Fault("format", None, f"the robot has no joint {name}")
+        for gripper in {attachment.gripper for attachment in self.plan.attachments}:
+            if _finger(gripper) not in self.plan.joints:
+                yield Fault("format", None, f"{_finger(gripper)} is not in joint_names")
+
+    def joint(self, name: str) -> Any:
+        return self.model.joints[self.model.getJointId(name)]
+
+    def limits(self, name: str) -> tuple[float, float]:
+        """Lower and upper limit; none if the joint turns freely."""
+        joint = self.joint(name)
+        if joint.nq > joint.nv:
+            return -np.inf, np.inf
+        model = self.model
+        return model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]
+
+    def forward(self, rows: np.ndarray) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+        """Poses (n, 4, 4) of the links that have a hull, and of the grippers' tool frames."""
+        model, geometry = self.model, self.geometry
+        data, placed = model.createData(), geometry.createData()
+        tools = {g: model.getFrameId(f"{s}_gripper_tool_frame") for g, s in SIDES.items()}
+        links = np.empty((len(self.hulls), len(rows), 4, 4))
+        grips = np.empty((len(tools), len(rows), 4, 4))
+        names = [*self.plan.fixed, *self.plan.joints]
+        values = np.hstack([np.tile(list(self.plan.fixed.values()), (len(rows), 1)), rows])
+        configurations = np.tile(pin.neutral(model), (len(rows), 1))
+        for name, value in zip(names, values.T, strict=True):
+            joint = self.joint(name)
+            if joint.nq > joint.nv:
+                configurations[:, joint.idx_q] = np.cos(value)
+                configurations[:, joint.idx_q + 1] = np.sin(value)
+            else:
+                configurations[:, joint.idx_q] = value
+        for row, configuration in enumerate(configurations):
+            pin.forwardKinematics(model, data, configuration)
+            pin.updateGeometryPlacements(model, data, geometry, placed)
+            for index, pose in enumerate(placed.oMg):
+                links[index, row] = pose.homogeneous
+            for index, frame in enumerate(tools.values()):
+                grips[index, row] = pin.updateFramePlacement(model, data, frame).homogeneous
+        links, grips = self.base @ links, self.base @ grips
+        return (
+            dict(zip(self.hulls, links, strict=True)),
+            dict(zip(tools, grips, strict=True)),
+        )
+
+
+def _finger(gripper: str) -> str:
+    """The joint that opens the gripper; the others of its fingers follow it."""
+    return f"{SIDES[gripper]}_gripper_l_finger_joint"
+
+
+def _vertices(item: Any) -> np.ndarray:
+    shape = item.geometry
+    if hasattr(shape, "halfSide"):
+        return _corners(2 * shape.halfSide)
+    mesh = np.array([shape.vertex(index) for index in range(shape.num_vertices)])
+    return mesh[ConvexHull(mesh).vertices]
+
+
+def _corners(size: Sequence[float]) -> np.ndarray:
+    return np.array(list(itertools.product((-0.5, 0.5), repeat=3))) * size
+
+
+def _limits(plan: Plan, robot: Robot) -> Iterator[Fault]:
+    fixed = [(name, np.array([value])) for name, value in plan.fixed.items()]
+    for name, values in [*fixed, *zip(plan.joints, plan.q.T, strict=True)]:
+        lower, upper = robot.limits(name)
+        beyond = np.maximum(lower - values, values - upper)
+        row = int(beyond.argmax())
+        if beyond[row] > ROUNDING:
+            text = f"{name} = {values[row]:.3f}, limits {lower:.3f} to {upper:.3f}"
+            yield Fault("limit", row, text)
+
+
+def _velocities(plan: Plan, robot: Robot) -> Iterator[Fault]:
+    speeds = np.abs(np.diff(plan.q, axis=0)) / np.diff(plan.times)[:, None]
+    for name, speed in zip(plan.joints, speeds.T, strict=True):
+        limit = robot.model.velocityLimit[robot.joint(name).idx_v]
+        interval = int(speed.argmax())
+        if speed[interval] > limit * (1 + ROUNDING):
+            text = f"{name} moves at {speed[interval]:.2f} rad/s, limit {limit:.2f}"
+            yield Fault("velocity", interval, text)
+
+
+def _mimics(plan: Plan) -> Iterator[Fault]:
+    """The fingers of a gripper are driven by one motor."""
+    column = plan.fixed | dict(zip(plan.joints, plan.q.T, strict=True))
+    for joint in ET.parse(URDF).getroot().iter("joint"):
+        mimic, name = joint.find("mimic"), joint.get("name", "")
+        if mimic is None or name not in plan.joints:
+            continue
+        leader = column.get(mimic.get("joint", ""), 0.0)
+        expected = float(mimic.get("multiplier", 1)) * leader + float(mimic.get("offset", 0))
+        apart = np.abs(column[name] - expected)
+        if apart.max() > ROUNDING:
+            text = f"{name} does not follow {mimic.get('joint')}"
+            yield Fault("mimic", int(apart.argmax()), text)
+
+
+# --- the boxes -----------------------------------------------------------------------------------
+
+
+def _carry(plan: Plan, tools: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Poses (n, 4, 4) of the boxes: at rest, or rigid in the tool frame they are attached to."""
+    rows = len(plan.times)
+    poses = {name: np.tile(_scene_pose(plan, name), (rows, 1, 1)) for name in plan.boxes}
+    for box, gripper, start, end in plan.attachments:
+        tool, pose = tools[gripper], poses[box]
+        pose[start : end + 1] = tool[start : end + 1] @ (_inverse(tool[start]) @ pose[start])
+        pose[end + 1 :] = pose[end]
+    return poses
+
+
+def _inverse(pose: np.ndarray) -> np.ndarray:
+    result = np.eye(4)
+    result[:3, :3] = pose[:3, :3].T
+    result[:3, 3] = -pose[:3, :3].T @ pose[:3, 3]
+    return result
+
+
+def _standing(plan: Plan, events: Sequence[Event], motion: Motion) -> Iterator[Fault]:
+    """Every box that is not held stands on its support, at the start and after every action.
+
+    Level, at the support's height, and with the centre of mass of it and all that it carries over
+    the support. A box that carries others is level all the way.
+    """
+    states = _states(plan, events)
+    rows = sorted({0, *(event.row for event in events), len(states) - 1})
+    reported = set()
+    for row in rows:
+        for box, support in states[row].support.items():
+            poses = {name: pose[row] for name, pose in motion.boxes.items()}
+            why = _unstable(plan, states[row], box, support, poses)
+            if why and (box, support) not in reported:
+                reported.add((box, support))
+                yield Fault("support", row, f"{box} on {support}: {why}")
+    for box, pose in motion.boxes.items():
+        rise = np.ptp(_points(pose, _base(plan.boxes[box]["size"]))[:, 2], axis=1)
+        loaded = [state.carried(box) != [] for state in states]
+        tilted = np.flatnonzero(np.array(loaded) & (rise > ON_SUPPORT))
+        if tilted.size:
+            row = int(tilted[0])
+            text = f"{box} is tilted by {1e3 * rise[row]:.0f} mm under {states[row].carried(box)}"
+            yield Fault("support", row, text)
+
+
+def _unstable(
+    plan: Plan, state: State, box: str, support: str, poses: Mapping[str, np.ndarray]
+) -> str | None:
+    if support in plan.tables:
+        ground, half = _scene_pose(plan, support), np.array(plan.tables[support]["half_extents"])
+    else:
+        size = np.array(plan.boxes[support]["size"])
+        ground = poses[support] @ _planar(0, 0, size[2] / 2, 0)
+        half = size[:2] / 2
+    into = _inverse(ground)
+    gaps = (into @ poses[box] @ _homogeneous(_base(plan.boxes[box]["size"])).T)[2]
+    if np.abs(gaps).max() > ON_SUPPORT:
+        return f"the bottom is {1e3 * gaps.min():.0f} to {1e3 * gaps.max():.0f} mm above it"
+    stack = [box, *state.carried(box)]
+    masses = [np.prod(plan.boxes[name]["size"]) for name in stack]
+    centre = into @ np.average([poses[name][:, 3] for name in stack], axis=0, weights=masses)
+    if (np.abs(centre[:2]) > half).any():
+        return f"the centre of {' '.join(stack)} is not over it"
+    return None
+
+
+def _base(size: Sequence[float]) -> np.ndarray:
+    corners = _corners(size)
+    return corners[corners[:, 2] < 0]
+
+
+def _homogeneous(points: np.ndarray) -> np.ndarray:
+    return np.column_stack([points, np.ones(len(points))])
+
+
+def _keyframes(plan: Plan, events: Sequence[Event], motion: Motion) -> Iterator[Fault]:
+    """Keyframe k is the path where action k takes effect."""
+    for number, (event, keyframe) in enumerate(zip(events, plan.keyframes, strict=True)):
+        apart = np.abs(keyframe.q - plan.q[event.row])
+        if apart.max() > ROUNDING:
+            name = plan.joints[int(apart.argmax())]
+            text = f"keyframe {number}: {name} is {apart.max():.3f} rad off the path"
+            yield Fault("keyframe", event.row, text)
+        for name, (position, yaw) in keyframe.boxes.items():
+            pose = motion.boxes[name][event.row]
+            off = np.linalg.norm(position - pose[:3, 3])
+            turn = yaw - np.arctan2(pose[1, 0], pose[0, 0])
+            upright = pose[2, 2] > np.cos(SAME_ANGLE)
+            if off > SAME_POSITION or (upright and abs(np.sin(turn / 2)) > SAME_ANGLE / 2):
+                text = f"keyframe {number}: {name} is not where the path has it ({off:.3f} m)"
+                yield Fault("keyframe", event.row, text)
+
+
+# --- the grippers --------------------------------------------------------------------------------
+
+
+def _leaves(tool: np.ndarray, row: int, distance: float, step: Literal[-1, 1]) -> int | None:
+    """The first row from ``row`` on (step 1) or back at which the tool is that far away."""
+    away = np.linalg.norm(tool[:, :3, 3] - tool[row, :3, 3], axis=1) > distance
+    rows = np.flatnonzero(away[row:] if step > 0 else away[row::-1])
+    return row + step * int(rows[0]) if rows.size else None
+
+
+def _fingers(plan: Plan, events: Sequence[Event], motion: Motion) -> Iterator[Fault]:
+    """The fingers are open on the way to a box, closed while they hold it, open on the way off."""
+    for event in events:
+        (box, gripper, start, end), tool = event.attachment, motion.tools[event.attachment.gripper]
+        opening = plan.q[:, plan.joints.index(_finger(gripper))]
+        if event.action[0] == "place":
+            left = _leaves(tool, end, AWAY, 1)
+            if left is not None and opening[left] < opening[end] + OPENED:
+                yield Fault("fingers", left, f"{gripper} leaves {box} without opening")
+            continue
+        came = _leaves(tool, start, AWAY, -1)
+        if came is not None and opening[came] < opening[start] + OPENED:
+            yield Fault("fingers", came, f"{gripper} comes to {box} without opening")
+        moved = np.abs(opening[start : end + 1] - opening[start])
+        if moved.max() > ROUNDING:
+            yield Fault("fingers", start + int(moved.argmax()), f"{gripper} moves fingers on {box}")
+
+
+def _grasps(plan: Plan, robot: Robot, events: Sequence[Event], motion: Motion) -> Iterator[Fault]:
+    """When a grasp takes effect, both fingers are at the box, on opposite sides of it."""
+    with _World(plan, robot) as world:
+        for event in (event for event in events if event.action[0] == "grasp"):
+            box, gripper, row, _ = event.attachment
+            into = _inverse(motion.tools[gripper][row])
+            sides = []
+            for finger in "lr":
+                points: list[tuple[tuple[float, ...], float]] = []
+                for part in ("finger", "finger_tip"):
+                    link = f"{SIDES[gripper]}_gripper_{finger}_{part}_link"
+                    poses = {link: motion.links[link][row], box: motion.boxes[box][row]}
+                    points += world.closest(link, box, poses, AT_BOX)
+                sides += [(into @ (*on_box, 1))[1] for on_box, _ in points[:1]]
+            if len(sides) < 2 or sides[0] * sides[1] > 0:
+                text = f"{gripper} does not have {box} between its fingers"
+                yield Fault("grasp", row, text)
+
+
+# --- collisions ----------------------------------------------------------------------------------
+
+
+class _World:
+    """The hulls in a PyBullet client of its own."""
+
+    def __init__(self, plan: Plan, robot: Robot) -> None:
+        self.client = pybullet.connect(pybullet.DIRECT)
+        self.vertices = dict(robot.hulls)
+        for name, box in plan.boxes.items():
+            self.vertices[name] = _corners(box["size"])
+        for name, table in plan.tables.items():
+            x, y = table["half_extents"]
+            slab = _corners((2 * x, 2 * y, TABLE_THICKNESS))
+            self.vertices[name] = slab - (0, 0, TABLE_THICKNESS / 2)
+        self.bodies = {}
+        for name, vertices in self.vertices.items():
+            shape = pybullet.createCollisionShape(
+                pybullet.GEOM_MESH, vertices=vertices.tolist(), physicsClientId=self.client
+            )
+            self.bodies[name] = pybullet.createMultiBody(0, shape, physicsClientId=self.client)
+
+    def __enter__(self) -> "_World":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pybullet.disconnect(self.client)
+
+    def closest(
+        self, first: str, second: str, poses: Mapping[str, np.ndarray], within: float
+    ) -> list[tuple[tuple[float, ...], float]]:
+        """Closest points on the second body, with distances (below zero: penetration)."""
+        for name in (first, second):
+            pybullet.resetBasePositionAndOrientation(
+                self.bodies[name],
+                poses[name][:3, 3],
+                Rotation.from_matrix(poses[name][:3, :3]).as_quat(),
+                physicsClientId=self.client,
+            )
+        points = pybullet.getClosestPoints(
+            self.bodies[first], self.bodies[second], within, physicsClientId=self.client
+        )
+        return [(point[6], point[8] + 2 * HULL_MARGIN) for point in points]
+
+
+def _samples(plan: Plan, robot: Robot, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
+    """Intervals (m,) and joint positions (m, joints) so close that no link point moves a step."""
+    vertices = robot.hulls | {name: _corners(box["size"]) for name, box in plan.boxes.items()}
+    reach = np.zeros(len(plan.times) - 1)
+    for name, pose in (motion.links | motion.boxes).items():
+        moves = np.linalg.norm(np.diff(_points(pose, vertices[name]), axis=0), axis=1)
+        reach = np.maximum(reach, moves.max(axis=1))
+    counts = np.maximum(1, np.ceil(1.1 * reach / STEP)).astype(int)  # an arc exceeds its chord
+    intervals = np.repeat(np.arange(len(counts)), counts)
+    fraction = np.concatenate([np.arange(count) / count for count in counts])[:, None]
+    q = (1 - fraction) * plan.q[intervals] + fraction * plan.q[intervals + 1]
+    return np.append(intervals, len(counts) - 1), np.vstack([q, plan.q[-1]])
+
+
+def _points(poses: np.ndarray, vertices: np.ndarray) -> np.ndarray:
+    """The vertices (k, 3) at every pose (n, 4, 4): (n, 3, k)."""
+    return poses[:, :3] @ _homogeneous(vertices).T
+
+
+def _collisions(
+    plan: Plan, robot: Robot, events: Sequence[Event], motion: Motion
+) -> Iterator[Fault]:
+    """Pairs of bodies that overlap by more than the tolerance, each where it is deepest.
+
+    A box and its support touch without overlapping, so the tolerance is all they need.
+    """
+    intervals, q = _samples(plan, robot, motion)
+    dense, grips = robot.forward(q)
+    for name, pose in motion.boxes.items():
+        dense[name] = pose[intervals]
+    for box, gripper, start, end in plan.attachments:
+        held = (intervals >= start) & (intervals < end)
+        in_hand = _inverse(motion.tools[gripper][start]) @ motion.boxes[box][start]
+        dense[box][held] = grips[gripper][held] @ in_hand
+        dense[box][intervals >= end] = motion.boxes[box][end]
+    for table in plan.tables:
+        dense[table] = np.tile(_scene_pose(plan, table), (len(q), 1, 1))
+    declared = _declared_contacts(events, motion)
+    with _World(plan, robot) as world:
+        ranges = {}
+        for name, vertices in world.vertices.items():
+            points = _points(dense[name], vertices)
+            ranges[name] = points.min(axis=2), points.max(axis=2)
+        for first, second in _pairs(plan, robot):
+            (low, high), (low2, high2) = ranges[first], ranges[second]
+            allowed = np.full(len(q), PENETRATION)
+            for begin, end in declared.get((first, second), []):
+                allowed[(intervals >= begin) & (intervals < end)] = IN_HAND
+            overlap = (np.minimum(high, high2) - np.maximum(low, low2)).min(axis=1)
+            depths = np.zeros(len(q))
+            for sample in np.flatnonzero(overlap > allowed):  # the depth is at most the overlap
+                at = {name: dense[name][sample] for name in (first, second)}
+                found = [-distance for _, distance in world.closest(first, second, at, 0.0)]
+                depths[sample] = max(found, default=0.0)
+            worst = int((depths - allowed).argmax())
+            if depths[worst] > allowed[worst]:
+                row = int(intervals[worst])
+                text = f"{first} is {1e3 * depths[worst]:.0f} mm inside {second}"
+                yield Fault("collision", row, f"{text} at {plan.times[row]:.2f} s")
+
+
+def _pairs(plan: Plan, robot: Robot) -> Iterator[tuple[str, str]]:
+    disabled = {
+        frozenset((pair.get("link1"), pair.get("link2")))
+        for pair in ET.parse(SRDF).getroot().iter("disable_collisions")
+    }
+    for pair in itertools.combinations([*robot.hulls, *plan.boxes, *plan.tables], 2):
+        if frozenset(pair) not in disabled and not set(pair) <= plan.tables.keys():
+            yield pair
+
+
+def _declared_contacts(
+    events: Sequence[Event], motion: Motion
+) -> dict[tuple[str, str], list[tuple[int, int]]]:
+    """Intervals, by link of a hand and box, from the approach to a box to the retreat from it."""
+    contacts: dict[tuple[str, str], list[tuple[int, int]]] = {}
+    for event in events:
+        if event.action[0] == "place":
+            continue
+        (box, gripper, start, end), tool = event.attachment, motion.tools[event.attachment.gripper]
+        begin = _leaves(tool, start, APPROACH, -1) or 0
+        until = _leaves(tool, end, APPROACH, 1) or len(tool)
+        for part in ("palm", "l_finger", "l_finger_tip", "r_finger", "r_finger_tip"):
+            link = f"{SIDES[gripper]}_gripper_{part}_link"
+            contacts.setdefault((link, box), []).append((begin, until))
+    return contacts
