@@ -8,7 +8,7 @@ INSTALLED := $(VENV)/.installed
 export PATH := $(BIN):$(PATH)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: setup repro test lint bench mlflow
+.PHONY: setup repro test lint bench mlflow verify-determinism
 
 setup: $(INSTALLED)
 
@@ -40,6 +40,10 @@ lint: setup
 bench: setup
 	dvc repro -q generate_scenes
 	python benchmarks/run.py
+
+# The small profile with one worker and with two, compared byte by byte.
+verify-determinism: setup
+	python tests/determinism.py
 
 mlflow: setup
 	guided-lgp mlflow ui

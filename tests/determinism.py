@@ -1,0 +1,111 @@
+"""Same seed, same bytes, whatever the number of workers: the check of `make verify-determinism`.
+
+Runs the small profile of the commit at HEAD in two fresh clones, with one worker and with two, and
+compares every file that it writes. Ends with 1 if any differs; the clones are then kept.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from tempfile import mkdtemp
+
+import yaml
+
+ROOT = Path(__file__).parents[1]
+OUTPUTS = ("data", "models", "reports")
+TIMING = Path("reports/metrics/scalability_timing.json")
+"""The one output that may differ: it holds measured times and memory."""
+
+
+class Clone:
+    """A clone of the repository with the small profile and without any results."""
+
+    def __init__(self, folder: Path, workers: int) -> None:
+        self.folder = folder
+        subprocess.run(["git", "clone", "-q", str(ROOT), str(folder)], check=True)
+        params = yaml.safe_load((folder / "tests" / "params.yaml").read_text())
+        params["parallel"]["workers"] = workers
+        (folder / "params.yaml").write_text(yaml.safe_dump(params, sort_keys=False))
+        (folder / "dvc.lock").unlink()
+        for name in OUTPUTS:
+            shutil.rmtree(folder / name, ignore_errors=True)
+
+    def run(self, *command: str) -> None:
+        """Run a command with the packages of this environment, but the sources of the clone."""
+        kept = {name: os.environ[name] for name in os.environ if not name.startswith("DVC_")}
+        path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+        own = {
+            "PATH": path,
+            "PYTHONPATH": str(self.folder / "src"),
+            "XDG_CACHE_HOME": str(self.folder / ".cache"),
+            "MLFLOW_TRACKING_URI": f"sqlite:///{self.folder / 'mlflow.db'}",
+        }
+        subprocess.run(command, cwd=self.folder, env=kept | own, check=True)
+
+    def check_sources(self) -> None:
+        """Make sure that the clone runs its own sources, not those that are installed."""
+        package = self.folder / "src" / "guided_lgp" / "__init__.py"
+        code = f"import guided_lgp as g; assert g.__file__ == {str(package)!r}, g.__file__"
+        self.run("python", "-c", code)
+
+    def repro(self) -> None:
+        """Run the pipeline."""
+        start = time.monotonic()
+        self.run("dvc", "repro", "--quiet")
+        print(f"{self.folder.name}: {time.monotonic() - start:.0f} s", flush=True)
+
+
+def render_with_times_of(first: Path, second: Clone) -> None:
+    """Give the second run the first one's times and render its reports again.
+
+    The tables, the figure and the pages that show times can then be compared like all the rest.
+    """
+    shutil.copy(first / TIMING, second.folder / TIMING)
+    second.run("dvc", "repro", "--quiet", "--single-item", "--force", "render_reports")
+
+
+def outputs(folder: Path) -> set[Path]:
+    """What a run has written, relative to its folder."""
+    found = (file for name in OUTPUTS for file in (folder / name).rglob("*") if file.is_file())
+    return {file.relative_to(folder) for file in found} - {TIMING}
+
+
+def differences(first: Path, second: Path) -> Iterator[str]:
+    """One line for each output that is not the same in both folders."""
+    for file in sorted(outputs(first) | outputs(second)):
+        contents = [
+            path.read_bytes() if path.is_file() else None for path in (first / file, second / file)
+        ]
+        if None in contents:
+            writer = second if contents[0] is None else first
+            yield f"{file}: written in {writer.name} only"
+        elif contents[0] != contents[1]:
+            yield f"{file}: differs"
+
+
+def main() -> int:
+    """Run, compare, report."""
+    parent = Path(mkdtemp(prefix="determinism-"))
+    clones = [Clone(parent / f"workers-{workers}", workers) for workers in (1, 2)]
+    for clone in clones:
+        clone.check_sources()
+        clone.repro()
+    first, second = (clone.folder for clone in clones)
+    render_with_times_of(first, clones[1])
+    found = list(differences(first, second))
+    for line in found:
+        print(line)
+    print(f"{len(outputs(first))} files compared (not {TIMING}), {len(found)} differences")
+    if found:
+        print(f"the clones are kept in {parent}")
+        return 1
+    shutil.rmtree(parent)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
