@@ -351,7 +351,7 @@ def _is_plan(file: Path) -> bool:
     """Whether a file is a plan; a file that cannot be read is left to the reader of scenes."""
     try:
         return "actions" in json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError, TypeError):
+    except (OSError, ValueError, TypeError, RecursionError):
         return False
 
 

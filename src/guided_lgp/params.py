@@ -1,13 +1,24 @@
 """The parameters of the pipeline: the model that validates ``params.yaml``."""
 
+import reprlib
 from pathlib import Path
 from typing import Annotated, Literal
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic_core import PydanticCustomError
 
 from guided_lgp.errors import InputError
 
+
+def _no_truth_value(value: object) -> object:
+    """Refuse ``true`` for 1.0; ``1e-3``, which YAML 1.1 takes for text, is a number."""
+    if isinstance(value, bool):
+        raise PydanticCustomError("float_type", "input should be a valid number")
+    return value
+
+
+_NUMBER = BeforeValidator(_no_truth_value)
 Count = Annotated[int, Field(strict=True, ge=1, le=10_000_000)]
 Seed = Annotated[int, Field(strict=True, ge=0, lt=2**63)]
 
@@ -60,18 +71,18 @@ class Network(_Section):
 
     layers: Annotated[int, Field(strict=True, ge=1, le=20)]
     nodes: Annotated[int, Field(strict=True, ge=1, le=4096)]
-    dropout: Annotated[float, Field(ge=0, lt=1)]
-    l2: Annotated[float, Field(ge=0, le=1)]
+    dropout: Annotated[float, Field(ge=0, lt=1), _NUMBER]
+    l2: Annotated[float, Field(ge=0, le=1), _NUMBER]
     epochs: Annotated[int, Field(strict=True, ge=1, le=100_000)]
     batch: Annotated[int, Field(strict=True, ge=1, le=1_000_000)]
-    lr: Annotated[float, Field(gt=0, le=1)]
+    lr: Annotated[float, Field(gt=0, le=1), _NUMBER]
 
 
 class TrainPolicy(_Section):
     """Training of the three networks (paper, Table IV)."""
 
     seed: Seed
-    validation_share: Annotated[float, Field(gt=0, lt=1)]
+    validation_share: Annotated[float, Field(gt=0, lt=1), _NUMBER]
     patience: Count
     instruction: Network
     grasp: Network
@@ -111,7 +122,10 @@ def load_params(path: Path = Path("params.yaml")) -> Params:
         document = yaml.safe_load(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise InputError(str(path), error.strerror or "cannot be read") from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
+    except RecursionError:
+        raise InputError(str(path), "is nested too deeply") from None
+    except (yaml.YAMLError, ValueError, LookupError, AttributeError) as error:
+        # PyYAML raises the last three for values that do not fit their tag, such as 2024-13-45.
         raise InputError(str(path), f"is not YAML: {' '.join(str(error).split())}") from None
     try:
         return Params.model_validate(document)
@@ -130,7 +144,15 @@ def _input_error(path: Path, error: ValidationError) -> InputError:
             return InputError(where, "missing")
         case "model_type":
             return InputError(where, "is not a mapping", ", ".join(_accepted_keys(keys)))
-    return InputError(where, f"{first['msg'].lower()}, not {first['input']!r}")
+    return InputError(where, f"{first['msg'].lower()}, not {_brief(first['input'])}")
+
+
+def _brief(value: object) -> str:
+    """The value as text of bounded length: aliases make small files of huge values."""
+    try:
+        return reprlib.repr(value)
+    except ValueError:  # Python does not write out integers of more than 4300 digits
+        return "a number of thousands of digits"
 
 
 def _accepted_keys(section: list[str]) -> list[str]:

@@ -1,0 +1,342 @@
+"""Files between the stages: scenes, tables, data set, models, metrics. Damaged ones are refused."""
+
+import json
+import struct
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from bad_input import answer, examples, garbled, odd_values, spoilt, truncated, write_json
+from hypothesis import given
+from hypothesis import strategies as st
+from safetensors.numpy import save_file
+
+from guided_lgp.experiments.enumerate_sequences import SHORTEST, VERDICTS
+from guided_lgp.experiments.files import read_table, write_table
+from guided_lgp.logic import Symbols, two_goal_objectives
+from guided_lgp.policy.dataset import Dataset, load_dataset
+from guided_lgp.policy.encoding import CHAINS, Encoding
+from guided_lgp.policy.inference import load_policy
+from guided_lgp.policy.models import Model, load_model
+from guided_lgp.policy.samples import build_dataset
+from guided_lgp.report.inputs import read_json
+from guided_lgp.scene import GeneratedScenes, generate, load_scenes
+
+SYMBOLS = Symbols(("pr2L", "pr2R"), ("red", "green", "blue"), ("tab1", "tab2"))
+OBJECTIVES = tuple(two_goal_objectives(SYMBOLS)[:5])
+STAGE = "some_stage"
+
+
+@pytest.fixture(scope="module")
+def scenes(folder: Path) -> Path:
+    path = folder / "scenes.json"
+    generate("a", 3, 1, "scene").save(path)
+    return path
+
+
+@examples(150)
+@given(data=st.data())
+def test_spoilt_scene_files(data: st.DataObject, scenes: Path, folder: Path) -> None:
+    document = json.loads(scenes.read_text(encoding="utf-8"))
+    index = data.draw(st.integers(0, 2))
+    document["scenes"][index] = data.draw(spoilt(document["scenes"][index]))
+    file = write_json(folder / "spoilt.json", document)
+    found = answer(lambda: load_scenes(file), f"{file}: scenes.{index}")
+    if found is not None:
+        assert len(found.scenes) == 3
+
+
+@examples(100)
+@given(data=st.data())
+def test_truncated_scene_files(data: st.DataObject, scenes: Path, folder: Path) -> None:
+    file = folder / "truncated.json"
+    file.write_bytes(data.draw(truncated(scenes.read_bytes().rstrip())))
+    assert answer(lambda: load_scenes(file), file) is None
+
+
+@pytest.fixture(scope="module")
+def tables(scenes: Path, folder: Path) -> Mapping[str, Path]:
+    """Both tables of the enumeration, as if one action had been feasible in each scene."""
+    found = load_scenes(scenes)
+    verdicts, shortest = [], []
+    for scene in found.scenes:
+        for box in SYMBOLS.boxes:
+            verdicts.append(
+                {
+                    "configuration": scene.name,
+                    "skeleton": f"(grasp pr2L {box})",
+                    "length": 1,
+                    "feasible": box != "blue",
+                    "failure_constraint": "reach" if box == "blue" else None,
+                    "states": [0.1 * step for step in range(42)] if box != "blue" else None,
+                }
+            )
+        shortest += [
+            {"configuration": scene.name, "objective": " ".join(map(str, goals)), "length": 1}
+            for goals in OBJECTIVES
+        ]
+    paths = {"verdicts": folder / "verdicts.parquet", "shortest": folder / "shortest.parquet"}
+    write_table(paths["verdicts"], pa.Table.from_pylist(verdicts, schema=VERDICTS))
+    write_table(paths["shortest"], pa.Table.from_pylist(shortest, schema=SHORTEST))
+    return paths
+
+
+COLUMNS = {"verdicts": VERDICTS.names, "shortest": SHORTEST.names}
+
+
+def table(path: Path, columns: Sequence[str]) -> list[dict[str, Any]] | None:
+    rows = answer(lambda: read_table(path, STAGE, columns), path)
+    for row in rows or ():
+        assert list(row) == list(columns)
+    return rows
+
+
+@examples(100)
+@given(name=st.sampled_from(("verdicts", "shortest")), data=st.data())
+def test_truncated_tables(
+    name: str, data: st.DataObject, tables: Mapping[str, Path], folder: Path
+) -> None:
+    file = folder / "truncated.parquet"
+    file.write_bytes(data.draw(truncated(tables[name].read_bytes())))
+    assert table(file, COLUMNS[name]) is None
+
+
+@examples(250)
+@given(name=st.sampled_from(("verdicts", "shortest")), data=st.data())
+def test_garbled_tables(
+    name: str, data: st.DataObject, tables: Mapping[str, Path], folder: Path
+) -> None:
+    file = folder / "garbled.parquet"
+    file.write_bytes(data.draw(garbled(tables[name].read_bytes())))
+    table(file, COLUMNS[name])
+
+
+@examples(60)
+@given(
+    columns=st.dictionaries(
+        st.sampled_from(("configuration", "objective", "length", "other", "κ")),
+        st.lists(st.integers() | st.none(), min_size=2, max_size=2).filter(
+            lambda values: all(value is None or abs(value) < 2**63 for value in values)
+        ),
+    ),
+    version=st.sampled_from((b"1", b"2", b"", None)),
+)
+def test_tables_of_another_make(
+    columns: dict[str, list[int]], version: bytes | None, folder: Path
+) -> None:
+    file = folder / "other.parquet"
+    wanted = ["configuration", "length"]
+    written = pa.table(columns)
+    metadata = None if version is None else {b"guided_lgp": version}
+    pq.write_table(written.replace_schema_metadata(metadata), file)
+    rows = table(file, wanted)
+    assert (rows is not None) == (version == b"1" and set(wanted) <= set(columns))
+
+
+@examples(120)
+@given(
+    name=st.sampled_from(("verdicts", "shortest")),
+    how=st.sampled_from(("truncate", "random")),
+    data=st.data(),
+)
+def test_a_data_set_from_damaged_tables(
+    name: str, how: str, data: st.DataObject, scenes: Path, tables: Mapping[str, Path], folder: Path
+) -> None:
+    file = folder / "damaged.parquet"
+    content = tables[name].read_bytes()
+    file.write_bytes(data.draw(truncated(content) if how == "truncate" else st.binary(max_size=99)))
+    paths = {**tables, name: file}
+    found = load_scenes(scenes).scenes
+    built = answer(
+        lambda: build_dataset(found, paths["verdicts"], paths["shortest"], OBJECTIVES, 0), file
+    )
+    assert built is None
+
+
+@pytest.fixture(scope="module")
+def dataset(folder: Path) -> Path:
+    rng = np.random.default_rng(1)
+    encoding = Encoding()
+    path = folder / "dataset"
+    Dataset(
+        encoding=encoding,
+        symbols=SYMBOLS,
+        objectives=OBJECTIVES,
+        configurations=("scene-000",),
+        states=rng.normal(size=(20, encoding.state_size)).astype(np.float32),
+        actions=rng.integers(0, 2, (20, 4)).astype(np.int8),
+        configuration=np.zeros(20, np.int16),
+        goals=rng.integers(0, 2, (5, 20)).astype(np.float32),
+        sample_state=rng.integers(0, 20, 30).astype(np.int32),
+        sample_goals=rng.integers(0, 5, 30).astype(np.int32),
+    ).save(path)
+    return path
+
+
+def copy_files(source: Path, target: Path) -> Path:
+    target.mkdir(exist_ok=True)
+    for file in source.iterdir():
+        (target / file.name).write_bytes(file.read_bytes())
+    return target
+
+
+@examples(120)
+@given(how=st.sampled_from(("truncate", "random")), data=st.data())
+def test_damaged_samples(how: str, data: st.DataObject, dataset: Path, folder: Path) -> None:
+    target = copy_files(dataset, folder / "dataset-2")
+    file = target / "samples.npz"
+    damage = truncated(file.read_bytes()) if how == "truncate" else st.binary(max_size=200)
+    file.write_bytes(data.draw(damage))
+    assert answer(lambda: load_dataset(target), file) is None
+
+
+@examples(60)
+@given(data=st.data())
+def test_samples_with_other_arrays(data: st.DataObject, dataset: Path, folder: Path) -> None:
+    """An array that is missing or too many, and one that only a pickle could hold."""
+    target = copy_files(dataset, folder / "dataset-3")
+    file = target / "samples.npz"
+    with np.load(file) as stored:
+        arrays = dict(stored)
+    name = data.draw(st.sampled_from(sorted(arrays)))
+    match data.draw(st.sampled_from(("missing", "extra", "pickle"))):
+        case "missing":
+            del arrays[name]
+        case "extra":
+            arrays[f"{name}_too"] = arrays[name]
+        case "pickle":
+            arrays[name] = np.array([{}, None], dtype=object)
+    np.savez_compressed(file, **arrays)
+    assert answer(lambda: load_dataset(target), file) is None
+
+
+@examples(150)
+@given(data=st.data())
+def test_garbled_descriptions_of_the_data_set(
+    data: st.DataObject, dataset: Path, folder: Path
+) -> None:
+    target = copy_files(dataset, folder / "dataset-4")
+    file = target / "dataset.json"
+    file.write_bytes(data.draw(garbled(file.read_bytes())))
+    found = answer(lambda: load_dataset(target), file, target / "samples.npz")
+    if found is not None:
+        assert found.encoding == Encoding()
+        assert len(found) == 30
+
+
+@pytest.fixture(scope="module")
+def models(folder: Path) -> Path:
+    """Networks of one hidden layer with random weights."""
+    rng = np.random.default_rng(2)
+    encoding = Encoding()
+    path = folder / "models"
+    for network, chain in CHAINS.items():
+        sub_policies = {}
+        for name, inputs in zip(chain, encoding.chain_inputs(network), strict=True):
+            widths = [inputs, 4, encoding.classes(name)]
+            sub_policies[name] = tuple(
+                (
+                    rng.normal(size=(after, before)).astype(np.float32),
+                    rng.normal(size=after).astype(np.float32),
+                )
+                for before, after in pairwise(widths)
+            )
+        Model(network, encoding, sub_policies, {"seed": 2}).save(path)
+    return path
+
+
+def check_model(found: Model | None, network: str) -> None:
+    """The layers of each sub-policy fit the encoding and each other."""
+    if found is None:
+        return
+    assert list(found.sub_policies) == list(CHAINS[network])
+    for (name, layers), inputs in zip(
+        found.sub_policies.items(), found.encoding.chain_inputs(network), strict=True
+    ):
+        width = inputs
+        for weight, bias in layers:
+            assert weight.shape == (len(bias), width)
+            width = len(bias)
+        assert width == found.encoding.classes(name)
+
+
+@examples(150)
+@given(network=st.sampled_from(sorted(CHAINS)), data=st.data())
+def test_garbled_weights(network: str, data: st.DataObject, models: Path, folder: Path) -> None:
+    target = copy_files(models, folder / "models-2")
+    file = target / f"{network}.safetensors"
+    file.write_bytes(data.draw(garbled(file.read_bytes())))
+    check_model(answer(lambda: load_model(target, network), file), network)
+
+
+@examples(60)
+@given(network=st.sampled_from(sorted(CHAINS)), data=st.data())
+def test_truncated_weights(network: str, data: st.DataObject, models: Path, folder: Path) -> None:
+    target = copy_files(models, folder / "models-3")
+    file = target / f"{network}.safetensors"
+    file.write_bytes(data.draw(truncated(file.read_bytes())))
+    assert answer(lambda: load_policy(target), file) is None
+
+
+@examples(60)
+@given(size=st.integers(0, 2**64 - 1), header=st.binary(max_size=60), data=st.data())
+def test_headers_of_weights(
+    size: int, header: bytes, data: st.DataObject, models: Path, folder: Path
+) -> None:
+    """The header of a safetensors file tells its own length first."""
+    target = copy_files(models, folder / "models-4")
+    file = target / "grasp.safetensors"
+    length = data.draw(st.sampled_from((size, len(header))))
+    file.write_bytes(struct.pack("<Q", length) + header)
+    assert answer(lambda: load_model(target, "grasp"), file) is None
+
+
+@examples(60)
+@given(
+    shape=st.lists(st.integers(0, 5), min_size=1, max_size=3).map(tuple),
+    part=st.sampled_from(("weight", "bias")),
+)
+def test_weights_of_another_shape(
+    shape: tuple[int, ...], part: str, models: Path, folder: Path
+) -> None:
+    target = copy_files(models, folder / "models-5")
+    file = target / "grasp.safetensors"
+    save_file({f"gripper.0.{part}": np.zeros(shape, np.float32)}, file)
+    assert answer(lambda: load_model(target, "grasp"), f"{file}: gripper.0") is None
+
+
+@examples(150)
+@given(network=st.sampled_from(sorted(CHAINS)), data=st.data())
+def test_garbled_descriptions_of_models(
+    network: str, data: st.DataObject, models: Path, folder: Path
+) -> None:
+    target = copy_files(models, folder / "models-6")
+    file = target / f"{network}.json"
+    file.write_bytes(data.draw(garbled(file.read_bytes())))
+    found = answer(lambda: load_model(target, network), file, file.with_suffix(".safetensors"))
+    check_model(found, network)
+
+
+@examples(100)
+@given(document=odd_values | st.dictionaries(st.text(max_size=5), odd_values, max_size=3))
+def test_metrics(document: Any, folder: Path) -> None:
+    file = write_json(folder / "metrics.json", document)
+    found = answer(lambda: read_json(file, STAGE), file)
+    assert (found is not None) == isinstance(document, dict)
+
+
+def test_the_undamaged_files_are_read(
+    scenes: Path, tables: Mapping[str, Path], dataset: Path, models: Path
+) -> None:
+    found = load_scenes(scenes)
+    assert isinstance(found, GeneratedScenes)
+    assert len(read_table(tables["verdicts"], STAGE, VERDICTS.names)) == 9
+    assert len(load_dataset(dataset)) == 30
+    for network in CHAINS:
+        check_model(load_model(models, network), network)
+    assert load_policy(models).encoding == Encoding()
