@@ -13,6 +13,7 @@ import grimp
 import pytest
 import yaml
 
+from determinism import TIMING, differences
 from guided_lgp.cli import STAGES
 from guided_lgp.params import Params, load_params
 
@@ -67,10 +68,23 @@ def test_the_small_profile_has_the_same_keys() -> None:
     load_params(ROOT / "tests" / "params.yaml")
 
 
+def test_a_changed_and_a_missing_output_are_differences(tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        (tmp_path / name / "data").mkdir(parents=True)
+        for file in ("same", "changed"):
+            (tmp_path / name / "data" / file).write_text(file)
+    folders = tmp_path / "one", tmp_path / "two"
+    assert list(differences(*folders)) == []
+    (folders[1] / "data" / "changed").write_text("otherwise")
+    (folders[0] / "data" / "new").touch()
+    expected = ["data/changed: differs", "data/new: written in one only"]
+    assert list(differences(*folders)) == expected
+
+
 class Clone:
     """A temporary clone of the working tree with the small profile."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, workers: int = 2) -> None:
         self.folder = folder
         path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
         self._environment = {
@@ -81,7 +95,8 @@ class Clone:
             if name.startswith("src/guided_lgp") or (ROOT / name).is_file():
                 (folder / name).parent.mkdir(parents=True, exist_ok=True)
                 shutil.copy(ROOT / name, folder / name)
-        shutil.copy(ROOT / "tests" / "params.yaml", folder / "params.yaml")
+        params = (ROOT / "tests" / "params.yaml").read_text()
+        (folder / "params.yaml").write_text(params.replace("workers: 2", f"workers: {workers}"))
         (folder / "dvc.lock").unlink(missing_ok=True)
         self.git("init", "-q")
         self.git("add", "-A")
@@ -150,6 +165,14 @@ class TestSmallProfile:
         page = (reports / "report.md").read_text()
         assert "Table I" in page
         assert "Table III" in page
+
+    def test_one_worker_writes_the_same_bytes(self, clone: Clone, tmp_path: Path) -> None:
+        alone = Clone(tmp_path, workers=1)
+        alone.dvc("repro")
+        assert (alone.folder / TIMING).read_bytes() != (clone.folder / TIMING).read_bytes()
+        shutil.copy(clone.folder / TIMING, alone.folder / TIMING)
+        alone.dvc("repro", "--single-item", "--force", "render_reports")
+        assert list(differences(alone.folder, clone.folder)) == []
 
     def test_a_second_run_does_nothing_within_seconds(self, clone: Clone) -> None:
         start = time.monotonic()
