@@ -149,7 +149,7 @@ def test_workers_end_with_the_process_that_started_them(
     assert {int(file.name) for file in tmp_path.iterdir()} <= {process.pid for process in below}
     parent.send_signal(number)
     assert parent.wait(20) != 0
-    wait_until(lambda: all(map(gone, below)), 5)
+    wait_until(lambda: all(map(gone, below)), 10)
 
 
 def test_a_stage_and_its_workers_end_with_the_process_that_runs_stages(tmp_path: Path) -> None:
@@ -157,7 +157,7 @@ def test_a_stage_and_its_workers_end_with_the_process_that_runs_stages(tmp_path:
     runner, below = start(tmp_path, STARTER, stage)
     runner.kill()
     runner.wait(5)
-    wait_until(lambda: all(map(gone, below)), 5)
+    wait_until(lambda: all(map(gone, below)), 10)
 
 
 def test_progress_in_a_pipe_is_a_line_per_milestone(caplog: pytest.LogCaptureFixture) -> None:
