@@ -109,16 +109,16 @@ def truncated(draw: st.DrawFn, content: bytes) -> bytes:
 
 
 @st.composite
-def garbled(draw: st.DrawFn, content: bytes) -> bytes:
-    """The file with up to 30 other bytes in one place, cut off, or nothing but random bytes."""
-    how = draw(st.sampled_from(("overwrite", "overwrite", "truncate", "random")))
-    if how == "truncate":
-        return draw(truncated(content))
-    if how == "random":
-        return draw(st.binary(max_size=200))
+def overwritten(draw: st.DrawFn, content: bytes) -> bytes:
+    """The file with up to 30 other bytes in one place."""
     start = draw(st.integers(0, len(content) - 1))
-    noise = draw(st.binary(min_size=1, max_size=30))
+    noise = draw(st.binary(min_size=1, max_size=30))[: len(content) - start]
     return content[:start] + noise + content[start + len(noise) :]
+
+
+def garbled(content: bytes) -> st.SearchStrategy[bytes]:
+    """The file with other bytes in one place, cut off, or nothing but random bytes."""
+    return st.one_of(overwritten(content), truncated(content), st.binary(max_size=200))
 
 
 def write_json(path: Path, document: Any) -> Path:
