@@ -196,7 +196,7 @@ def _other_table(plan: dict[str, Any], row: int, joint: int) -> None:
 
 
 def _box_moved(plan: dict[str, Any], row: int, joint: int) -> None:
-    plan["scene"]["boxes"][row % 2]["position"][joint % 2] += 0.08
+    plan["scene"]["boxes"][row % 2]["position"][joint % 2] += 0.16
 
 
 def _early_grasp(plan: dict[str, Any], row: int, joint: int) -> None:
