@@ -57,7 +57,10 @@ def keep_busy(folder: Path) -> None:
         pass
 
 
+# A shell that starts the tests in the background has them, and all below, ignore SIGINT.
 FAN_OUT = """
+import signal
+signal.signal(signal.SIGINT, signal.default_int_handler)
 from pathlib import Path
 from test_parallel import keep_busy
 from guided_lgp.parallel import run
