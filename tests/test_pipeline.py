@@ -19,7 +19,7 @@ from guided_lgp.params import Params, load_params
 
 ROOT = Path(__file__).parents[1]
 INFRASTRUCTURE = {"guided_lgp"} | {
-    f"guided_lgp.{name}" for name in ("errors", "parallel", "params", "paths")
+    f"guided_lgp.{name}" for name in ("documents", "errors", "parallel", "params", "paths")
 }
 """Modules that do not determine a stage's results: fan-out, messages, places."""
 UNUSED = {"enumerate_sequences": {"guided_lgp.nlp.path"}}

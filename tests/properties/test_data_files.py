@@ -1,6 +1,7 @@
 """Files between the stages: scenes, tables, data set, models, metrics. Damaged ones are refused."""
 
 import json
+import math
 import struct
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
@@ -33,7 +34,7 @@ from guided_lgp.policy.encoding import CHAINS, Encoding
 from guided_lgp.policy.inference import load_policy
 from guided_lgp.policy.models import Model, load_model
 from guided_lgp.policy.samples import build_dataset
-from guided_lgp.report.inputs import read_json
+from guided_lgp.report.inputs import read_object
 from guided_lgp.scene import GeneratedScenes, generate, load_scenes
 
 SYMBOLS = Symbols(("pr2L", "pr2R"), ("red", "green", "blue"), ("tab1", "tab2"))
@@ -182,6 +183,7 @@ def dataset(folder: Path) -> Path:
         configurations=("scene-000",),
         states=rng.normal(size=(20, encoding.state_size)).astype(np.float32),
         actions=rng.integers(0, 2, (20, 4)).astype(np.int8),
+        supports=rng.integers(-2, 5, (20, 3)).astype(np.int8),
         configuration=np.zeros(20, np.int16),
         goals=rng.integers(0, 2, (5, 20)).astype(np.float32),
         sample_state=rng.integers(0, 20, 30).astype(np.int32),
@@ -334,12 +336,24 @@ def test_garbled_descriptions_of_models(
     check_model(found, network)
 
 
+def finite(value: Any) -> bool:
+    """Whether all numbers of a document are finite."""
+    match value:
+        case dict():
+            return all(map(finite, value.values()))
+        case list():
+            return all(map(finite, value))
+        case float():
+            return math.isfinite(value)
+    return True
+
+
 @examples(100)
 @given(document=odd_values | st.dictionaries(st.text(max_size=5), odd_values, max_size=3))
 def test_metrics(document: Any, folder: Path) -> None:
     file = write_json(folder / "metrics.json", document)
-    found = answer(lambda: read_json(file, STAGE), file)
-    assert (found is not None) == isinstance(document, dict)
+    found = answer(lambda: read_object(file, STAGE), file)
+    assert (found is not None) == (isinstance(document, dict) and finite(document))
 
 
 def test_the_undamaged_files_are_read(

@@ -1,6 +1,5 @@
 """What the report is made from: metrics, verdicts, problems and scenes, read and checked."""
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,6 +7,7 @@ from typing import Any
 
 import pandas as pd
 
+from guided_lgp.documents import read_json
 from guided_lgp.errors import InputError
 from guided_lgp.experiments.files import read_table
 from guided_lgp.paths import EVALUATION, METRICS, SCENES, SEQUENCES, TRAINING
@@ -84,14 +84,14 @@ def load_inputs(root: Path) -> Inputs:
     runs = _frame(root / EVALUATION / "scalability.parquet", "compare_scalability", _RUNS)
     stage = "compare_scalability"
     return Inputs(
-        generalization=read_json(metrics / "generalization.json", "evaluate_generalization"),
-        scalability=mask_stopped(read_json(metrics / "scalability.json", stage), runs),
-        timing=mask_stopped(read_json(metrics / "scalability_timing.json", stage), runs),
+        generalization=read_object(metrics / "generalization.json", "evaluate_generalization"),
+        scalability=mask_stopped(read_object(metrics / "scalability.json", stage), runs),
+        timing=mask_stopped(read_object(metrics / "scalability_timing.json", stage), runs),
         training={
-            network: read_json(root / TRAINING / f"{network}.json", f"train_policy@{network}")
+            network: read_object(root / TRAINING / f"{network}.json", f"train_policy@{network}")
             for network in NETWORKS
         },
-        geometry=read_json(geometry, "make bench") if geometry.exists() else None,
+        geometry=read_object(geometry, "make bench") if geometry.exists() else None,
         scenes={name: load_scenes(root / SCENES / f"{name}.json") for name in SCENE_SETS},
         verdicts=pd.concat(verdicts, ignore_index=True),
         problems=_frame(
@@ -121,19 +121,14 @@ def _frame(path: Path, stage: str, columns: Sequence[str]) -> pd.DataFrame:
     return pd.DataFrame(read_table(path, stage, columns), columns=list(columns))
 
 
-def read_json(path: Path, stage: str) -> Metrics:
-    """Read a JSON object.
+def read_object(path: Path, stage: str) -> Metrics:
+    """Read a JSON object that a stage wrote.
 
     Raises:
         InputError: the file is missing or is not a JSON object.
     """
     remedy = f"the output of stage {stage}"
-    try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(str(path), error.strerror or "cannot be read", remedy) from None
-    except ValueError as error:
-        raise InputError(str(path), f"is not JSON: {error}", remedy) from None
+    document = read_json(path, remedy)
     if not isinstance(document, dict):
         raise InputError(str(path), "is not a JSON object", remedy)
     return document
