@@ -15,6 +15,7 @@ from guided_lgp.logic import (
     State,
     Symbols,
     format_objective,
+    parse_skeleton,
     progress,
     satisfied,
     two_goal_objectives,
@@ -91,6 +92,29 @@ def test_samples_are_those_of_the_definition(
 ) -> None:
     dataset = build_dataset(world.scenes, world.sequences, world.shortest, objectives, slack)
     assert found_samples(dataset) == expected_samples(world, objectives, slack)
+
+
+def test_supports_are_those_of_the_symbolic_states(
+    world: Enumeration, objectives: list[Objective]
+) -> None:
+    dataset = build(world, objectives, "paper")
+    start = 0
+    symbols = dataset.symbols
+    frame = pd.read_parquet(world.sequences)
+    for scene in world.scenes:
+        rows = frame[frame["feasible"] & (frame["configuration"] == scene.name)]
+        for text in rows["skeleton"]:
+            path = parse_skeleton(text)
+            for length in range(len(path)):
+                state = progress(scene.state, path[:length])
+                below = dict(state.support) | dict(state.held)
+                places = [
+                    symbols.tables[code] if code >= 0 else symbols.grippers[-1 - code]
+                    for code in dataset.supports[start].tolist()
+                ]
+                assert places == [below[box] for box in symbols.boxes]
+                start += 1
+    assert start == len(dataset.supports)
 
 
 def build(world: Enumeration, objectives: list[Objective], variant: str) -> Dataset:

@@ -196,3 +196,13 @@ def test_networks_of_different_encodings_are_refused(models: Path, tmp_path: Pat
         (models / name).write_bytes((tmp_path / "wide" / name).read_bytes())
     with pytest.raises(InputError, match="different encodings"):
         load_policy(models)
+
+
+def test_the_improved_policy_has_a_folder_of_its_own(models: Path) -> None:
+    with pytest.raises(InputError, match=r"improved/instruction\.json: is missing.*train_improved"):
+        load_policy(models, "improved")
+    save(models / "improved", Encoding(chain=False))
+    assert not load_policy(models, "improved").encoding.chain
+    assert load_policy(models).encoding.chain
+    with pytest.raises(InputError, match="policy 'other': is unknown .accepted: paper, improved"):
+        load_policy(models, "other")

@@ -37,6 +37,9 @@ class Dataset:
     """(M, state_size) the encoded states s_k of all sequences."""
     actions: NDArray[np.int8]
     """(M, 4) classes of the action that follows: instruction, gripper, box, table (-1: none)."""
+    supports: NDArray[np.int8]
+    """(M, boxes) what each box stands on before it, in the order of the slots: a class of table,
+    or -1 - g if gripper g holds the box."""
     configuration: NDArray[np.int16]
     """(M,) index of the configuration."""
     goals: FloatArray
@@ -95,6 +98,7 @@ class Dataset:
             directory / _SAMPLES,
             states=self.states,
             actions=self.actions,
+            supports=self.supports,
             configuration=self.configuration,
             goals=self.goals,
             sample_state=self.sample_state,

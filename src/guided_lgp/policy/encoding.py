@@ -203,6 +203,16 @@ class Encoding:
             -1 if action.table is None else slots.tables.index(action.table),
         )
 
+    def encode_supports(self, slots: Slots, state: State) -> tuple[int, ...]:
+        """What each box stands on or is held by, for boxes and supports that all have slots.
+
+        Returns:
+            (boxes,) the class of the table that a box stands on, or -1 - g if gripper g holds it.
+        """
+        below = {name: slots.tables.index(table) for name, table in state.support}
+        below |= {name: -1 - slots.grippers.index(gripper) for name, gripper in state.held}
+        return tuple(below[name] for name in slots.boxes if name is not None)
+
     def document(self) -> dict[str, Any]:
         """What is saved as JSON with the data set and the weights."""
         return {

@@ -12,6 +12,9 @@ from guided_lgp.policy.encoding import CHAINS, INSTRUCTIONS, Encoding, FloatArra
 from guided_lgp.policy.models import Layers, Model, load_model
 from guided_lgp.scene import GRIPPERS
 
+POLICIES = ("paper", "improved")
+"""The trained policies: the paper's networks, and the same ones with the improved recipe."""
+
 FLOOR = np.log(1e-6)
 """Log-probability of an action on a symbol that fills no slot: the networks cannot see it, and a
 complete search must be able to take it."""
@@ -64,19 +67,29 @@ class HierarchicalPolicy:
         return scores
 
 
-def load_policy(directory: Path) -> HierarchicalPolicy:
-    """Read the three networks; torch is not needed.
+def load_policy(directory: Path, name: str = "paper") -> HierarchicalPolicy:
+    """Read a trained policy; torch is not needed.
+
+    Args:
+        directory: the folder ``models``, or one with the same files.
+        name: one of :data:`POLICIES`.
 
     Raises:
         InputError: a file is missing, damaged, of another version, or the networks were trained
-            with different encodings; the message names the stage that makes them.
+            with different encodings; the message names the stage that makes them. Or there is no
+            policy of that name.
     """
-    models = {network: load_model(directory, network) for network in CHAINS}
+    if name not in POLICIES:
+        raise InputError(f"policy {name!r}", "is unknown", ", ".join(POLICIES))
+    stage = "train_policy"
+    if name == "improved":
+        directory, stage = directory / name, "train_improved"
+    models = {network: load_model(directory, network, stage) for network in CHAINS}
     if len({model.encoding for model in models.values()}) > 1:
         raise InputError(
             str(directory),
             "the networks were trained with different encodings",
-            "models of one run of the stage train_policy",
+            f"models of one run of the stage {stage}",
         )
     return HierarchicalPolicy(models)
 

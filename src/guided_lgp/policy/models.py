@@ -12,8 +12,6 @@ from safetensors.numpy import load_file, save_file
 from guided_lgp.errors import InputError
 from guided_lgp.policy.encoding import CHAINS, VERSION, Encoding, FloatArray
 
-_STAGE = "train_policy"
-
 Layers = tuple[tuple[FloatArray, FloatArray], ...]
 """Weight (outputs, inputs) and bias (outputs,) of every layer of a sub-policy."""
 
@@ -52,14 +50,19 @@ class Model:
         (directory / f"{self.network}.json").write_text(text + "\n", encoding="utf-8")
 
 
-def load_model(directory: Path, network: str) -> Model:
+def load_model(directory: Path, network: str, stage: str = "train_policy") -> Model:
     """Read what :meth:`Model.save` wrote.
+
+    Args:
+        directory: the folder of the files.
+        network: ``instruction``, ``grasp`` or ``place``.
+        stage: the stage that makes them, for the message.
 
     Raises:
         InputError: a file is missing, damaged, of another version or for another encoding.
     """
     path = directory / f"{network}.json"
-    remedy = f"version {VERSION}, the output of the stage {_STAGE}"
+    remedy = f"version {VERSION}, the output of the stage {stage}"
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
         version = document["version"]
@@ -68,7 +71,7 @@ def load_model(directory: Path, network: str) -> Model:
         raise InputError(str(path), fault, remedy) from None
     if version != VERSION:
         raise InputError(f"{path}: version", f"is {version!r}", remedy)
-    encoding = Encoding.parse(document.get("encoding"), str(path), _STAGE)
+    encoding = Encoding.parse(document.get("encoding"), str(path), stage)
     sizes = _sizes(document, network, encoding)
     if sizes is None:
         raise InputError(f"{path}: sub_policies", "do not fit the network's chain", remedy)

@@ -21,13 +21,14 @@ from guided_lgp.logic import (
     successor,
     unsatisfied,
 )
+from guided_lgp.params import Variant
 from guided_lgp.policy.dataset import Dataset
 from guided_lgp.policy.encoding import Encoding, FloatArray, Slots
-from guided_lgp.policy.variants import VARIANTS, Variant
 from guided_lgp.scene import Scene
 
 _LEAST_DEVIATION = 1e-3  # m; less is no information, and scaling it up would be noise
 _NONE = -1
+PAPER = Variant()
 _ENUMERATION = "the output of the stage enumerate_sequences for the same scenes"
 
 BoolArray = NDArray[np.bool_]
@@ -40,7 +41,7 @@ def build_dataset(
     shortest: Path,
     objectives: Sequence[Objective],
     slack: int,
-    variant: Variant = VARIANTS["paper"],
+    variant: Variant = PAPER,
     seed: int = 0,
 ) -> Dataset:
     """Collect the samples of the training configurations and objectives.
@@ -72,7 +73,7 @@ def build_dataset(
     if variant.any_order_of_boxes:
         slots = [replace(slots[0], boxes=boxes) for boxes in permutations(symbols.boxes)]
 
-    states, actions, configuration = [], [], []
+    states, actions, supports, configuration = [], [], [], []
     sample_state, sample_goals = [], []
     first = 0
     for index, scene in enumerate(scenes):
@@ -88,6 +89,7 @@ def build_dataset(
         sample_goals.append(codes[codes != _NONE])
         states.append(paths.states)
         actions.append(paths.actions)
+        supports.append(paths.supports)
         configuration.append(np.full(len(paths.states), index, dtype=np.int16))
         first += len(paths.states)
 
@@ -104,6 +106,7 @@ def build_dataset(
         configurations=tuple(scene.name for scene in scenes),
         states=encoding.scaled(positions),
         actions=np.concatenate(actions),
+        supports=np.concatenate(supports),
         configuration=np.concatenate(configuration),
         goals=np.array(goals.codes),
         sample_state=np.concatenate(sample_state).astype(np.int32),
@@ -125,6 +128,8 @@ class _Sequences:
     """(M, state_size) encoded states s_k before each step."""
     actions: NDArray[np.int8]
     """(M, 4) classes of each step's action."""
+    supports: NDArray[np.int8]
+    """(M, boxes) what each box stands on before each step; see :class:`Dataset`."""
 
 
 def _feasible_sequences(
@@ -154,12 +159,19 @@ def _feasible_sequences(
         for path, own in zip(skeletons, slots, strict=True)
         for action in path
     ]
+    along = [progress(skeleton) for skeleton in skeletons]
+    supports = [
+        encoding.encode_supports(own, state)
+        for path, own in zip(along, slots, strict=True)
+        for state in path[:-1]
+    ]
     return _Sequences(
-        progress=[progress(skeleton) for skeleton in skeletons],
+        progress=along,
         slots=slots,
         sequence=np.repeat(np.arange(len(skeletons)), [len(path) for path in skeletons]),
         states=np.concatenate(states),
         actions=np.array(classes, dtype=np.int8).reshape(-1, 4),
+        supports=np.array(supports, dtype=np.int8).reshape(-1, encoding.boxes),
     )
 
 
