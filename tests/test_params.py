@@ -101,7 +101,7 @@ def test_missing_keys(tmp_path: Path) -> None:
     assert message(tmp_path, content) == "build_dataset.seed: missing"
     content["build_dataset"] = 3
     assert message(tmp_path, content) == (
-        "build_dataset: is not a mapping (accepted: training_objectives, seed)"
+        "build_dataset: is not a mapping (accepted: training_objectives, seed, improved)"
     )
 
 

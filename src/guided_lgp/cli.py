@@ -34,6 +34,7 @@ STAGES = {
     "enumerate_sequences": "guided_lgp.experiments.enumerate_sequences",
     "build_dataset": "guided_lgp.experiments.build_dataset",
     "train_policy": "guided_lgp.experiments.train_policy",
+    "train_improved": "guided_lgp.experiments.train_improved",
     "evaluate_generalization": "guided_lgp.experiments.evaluate_generalization",
     "compare_scalability": "guided_lgp.experiments.compare_scalability",
     "render_reports": "guided_lgp.report.render",
@@ -257,6 +258,18 @@ def train_policy(
     Example: guided-lgp train_policy place
     """
     _run_stage("train_policy", params, network.value)
+
+
+@app.command("train_improved")
+def train_improved(
+    network: Annotated[Network, typer.Argument(help="Which of the three networks.")],
+    params: ParamsFile = PARAMS,
+) -> None:
+    """Train one network of the improved policy: models/improved, reports/training/improved.
+
+    Example: guided-lgp train_improved place
+    """
+    _run_stage("train_improved", params, network.value)
 
 
 @app.command("evaluate_generalization")

@@ -21,6 +21,7 @@ def _no_truth_value(value: object) -> object:
 _NUMBER = BeforeValidator(_no_truth_value)
 Count = Annotated[int, Field(strict=True, ge=1, le=10_000_000)]
 Seed = Annotated[int, Field(strict=True, ge=0, lt=2**63)]
+Flag = Annotated[bool, Field(strict=True)]
 
 
 class _Section(BaseModel):
@@ -59,11 +60,31 @@ class EnumerateSequences(_Section):
     slack: Annotated[int, Field(strict=True, ge=0, le=4)]
 
 
+class Variant(_Section):
+    """How samples are made and encoded; the defaults are the paper's."""
+
+    adapted_goals: Flag = False
+    """Where a goal holds already, add samples with the other goal alone, which is what objective
+    adaptation asks for in planning; the paper adapts objectives in planning alone."""
+    both_orders: Flag = True
+    """Duplicate each sample for both orders of its goals."""
+    any_order_of_boxes: Flag = False
+    """Let the boxes of each sequence fill the slots in an order drawn at random. Their names mean
+    nothing, so that what is learnt about one box holds for all; note that an unseen objective may
+    then be a seen one with other names."""
+    normalised: Flag = False
+    """Shift and scale every coordinate to mean 0 and deviation 1 over the training states."""
+    chain: Flag = True
+    """Feed each sub-policy with the decisions before it in its chain."""
+
+
 class BuildDataset(_Section):
     """Draw of the training objectives (paper, Table V)."""
 
     training_objectives: Annotated[int, Field(strict=True, ge=1, le=72)]
     seed: Seed
+    improved: Variant
+    """What the improved variant of the paper's networks is trained on."""
 
 
 class Network(_Section):
@@ -107,6 +128,7 @@ class Params(_Section):
     enumerate_sequences: EnumerateSequences
     build_dataset: BuildDataset
     train_policy: TrainPolicy
+    train_improved: TrainPolicy
     evaluate_generalization: SearchLimits
     compare_scalability: SearchLimits
 

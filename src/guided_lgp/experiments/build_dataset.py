@@ -3,7 +3,7 @@
 import logging
 from pathlib import Path
 
-from guided_lgp.params import Params
+from guided_lgp.params import Params, Variant
 from guided_lgp.paths import DATASET, SCENES, SEQUENCES
 from guided_lgp.policy.samples import build_dataset
 from guided_lgp.policy.split import training_objectives
@@ -13,16 +13,19 @@ logger = logging.getLogger(__name__)
 
 
 def run(params: Params, root: Path) -> None:
-    """Write ``data/dataset`` from the sequences of the training configurations."""
+    """Write ``data/dataset/<policy>`` from the sequences of the training configurations."""
     settings = params.build_dataset
     scenes = load_scenes(root / SCENES / "training.json").scenes
     objectives = training_objectives(scenes[0].symbols, settings.training_objectives, settings.seed)
-    dataset = build_dataset(
-        scenes,
-        root / SEQUENCES / "training.parquet",
-        root / SEQUENCES / "training_shortest.parquet",
-        objectives,
-        params.enumerate_sequences.slack,
-    )
-    dataset.save(root / DATASET)
-    logger.info("%d samples of %d objectives", len(dataset), len(objectives))
+    for policy, variant in {"paper": Variant(), "improved": settings.improved}.items():
+        dataset = build_dataset(
+            scenes,
+            root / SEQUENCES / "training.parquet",
+            root / SEQUENCES / "training_shortest.parquet",
+            objectives,
+            params.enumerate_sequences.slack,
+            variant,
+            settings.seed,
+        )
+        dataset.save(root / DATASET / policy)
+        logger.info("%s: %d samples of %d objectives", policy, len(dataset), len(objectives))

@@ -1,4 +1,4 @@
-"""Stage train_policy: one of the three networks."""
+"""Stage train_policy: one of the three networks, as the paper trains it."""
 
 from pathlib import Path
 
@@ -10,11 +10,6 @@ from guided_lgp.policy.train import train_network
 
 def run(params: Params, root: Path, network: str) -> None:
     """Write ``models/<network>.safetensors`` and ``.json`` and the report of the training."""
-    report = train_network(
-        network,
-        load_dataset(root / DATASET),
-        params.train_policy,
-        params.parallel,
-        root / TRAINED,
-    )
+    dataset = load_dataset(root / DATASET / "paper")
+    report = train_network(network, dataset, params.train_policy, params.parallel, root / TRAINED)
     report.save(root / TRAINING / f"{network}.json")
