@@ -12,7 +12,9 @@ from guided_lgp.scene.footprints import footprint, gap, inset
 from guided_lgp.scene.setups import CLEARANCE
 
 
-@pytest.mark.parametrize(("setup", "boxes"), [("a", 3), ("b", 3), ("c", 4), ("d", 5)])
+@pytest.mark.parametrize(
+    ("setup", "boxes"), [("a", 3), ("b", 3), ("c", 4), ("d", 5), ("e6", 6), ("e8", 8), ("e10", 10)]
+)
 def test_boxes_stand_wholly_on_their_tables_and_apart(setup: str, boxes: int) -> None:
     clearance = CLEARANCE if setup == "a" else 0.005
     for scene in generate(setup, 10, seed=1, prefix="x").scenes:
@@ -32,6 +34,13 @@ def test_only_setup_a_varies_the_table() -> None:
     }
     assert starts["a"] == {"tab1", "tab2"}
     assert starts["b"] == starts["c"] == starts["d"] == {"tab1"}
+
+
+@pytest.mark.parametrize("setup", ["e6", "e8", "e10"])
+def test_many_boxes_start_in_turn_on_both_tables_beyond_the_other_arm(setup: str) -> None:
+    for scene in generate(setup, 10, 3, "x").scenes:
+        assert [box.on for box in scene.boxes] == ["tab1", "tab2"] * (len(scene.boxes) // 2)
+        assert all(abs(box.position[1]) > 0.3 for box in scene.boxes)
 
 
 def test_more_configurations_leave_the_earlier_ones_as_they_were() -> None:

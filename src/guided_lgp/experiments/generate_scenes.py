@@ -6,6 +6,7 @@ from pathlib import Path
 from guided_lgp.params import Params
 from guided_lgp.paths import SCENES
 from guided_lgp.scene import generate
+from guided_lgp.scene.setups import SETUPS
 
 logger = logging.getLogger(__name__)
 
@@ -18,7 +19,7 @@ def run(params: Params, root: Path) -> None:
         ("test", "a", settings.test_configurations, settings.seed_test),
     ]
     count, seed = settings.scalability_configurations, settings.seed_scalability
-    wanted += [(f"scalability_{setup}", setup, count, seed) for setup in "abcd"]
+    wanted += [(f"scalability_{setup}", setup, count, seed) for setup in SETUPS]
     for name, setup, number, stream in wanted:
         scenes = generate(setup, number, stream, name.replace("_", "-"))
         scenes.save(root / SCENES / f"{name}.json")

@@ -1,6 +1,6 @@
-"""The scalability problems of Table II, with their objectives spelled out (DESIGN §6)."""
+"""The scalability problems: Table II, and family e beyond it, with their objectives spelled out."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, pairwise, permutations, product
 
@@ -11,7 +11,7 @@ Boxes = Sequence[str]
 
 @dataclass(frozen=True)
 class Problem:
-    """A row of Table II."""
+    """A row of Table II, or of family e."""
 
     name: str
     setup: str
@@ -52,13 +52,17 @@ def _towers_on_tray(boxes: Boxes) -> list[Objective]:
     return [tower(order, "tray") for order in orders[:: len(orders) // 6]]
 
 
+def _assignment(supports: Mapping[str, str]) -> Objective:
+    return tuple(Goal("on", box, support) for box, support in supports.items())
+
+
 def _spread(boxes: Boxes, on_tray: Sequence[str]) -> Objective:
-    return tuple(Goal("on", box, "tray" if box in on_tray else "tab2") for box in boxes)
+    return _assignment({box: "tray" if box in on_tray else "tab2" for box in boxes})
 
 
 def _every_assignment(boxes: Boxes) -> list[Objective]:
     return [
-        tuple(Goal("on", box, table) for box, table in zip(boxes, tables, strict=True))
+        _assignment(dict(zip(boxes, tables, strict=True)))
         for tables in product(("tray", "tab2"), repeat=len(boxes))
     ]
 
@@ -69,6 +73,28 @@ def _two_on_tray(boxes: Boxes) -> list[Objective]:
     return [_spread(boxes, pairs[index * len(pairs) // 6]) for index in range(6)]
 
 
+def _many_boxes(boxes: Boxes) -> list[Objective]:
+    """Towers, splits over the supports, and both; one goal per box, and every box must move.
+
+    Boxes start in turn on tab1 and on tab2, none on the tray.
+    """
+    left, right = boxes[::2], boxes[1::2]
+    third, quarter = len(boxes) // 3, len(boxes) // 4
+    across = dict.fromkeys(left[-quarter:], "tab2") | dict.fromkeys(right[-quarter:], "tab1")
+    split = {box: across.get(box, "tray") for box in boxes}
+    stacked = {left[0]: right[-1], right[0]: left[-1]}
+    return [
+        tower(boxes, "tray"),
+        tower(left, "tray") + tower(right, "tray"),
+        tower(right[:third], "tab1")
+        + tower(left[:third], "tab2")
+        + tower((*left[third:], *right[third:]), "tray"),
+        _assignment(split),
+        _assignment(split | stacked),
+        tuple(goal for pair in zip(left, right, strict=True) for goal in tower(pair, "tray")),
+    ]
+
+
 PROBLEMS = (
     Problem("a.1", "a", "stack boxes on table", 4, _stacks_of_three),
     Problem("b.1", "b", "place boxes on tray/tab2", 6, _every_assignment, reduced=True),
@@ -77,4 +103,7 @@ PROBLEMS = (
     Problem("c.2", "c", "stack boxes on tray", 8, _towers_on_tray),
     Problem("d.1", "d", "place boxes on tray/tab2", 10, _two_on_tray, reduced=True),
     Problem("d.2", "d", "stack boxes on tray", 10, _towers_on_tray),
+    Problem("e.6", "e6", "towers, splits and both", 12, _many_boxes),
+    Problem("e.8", "e8", "towers, splits and both", 16, _many_boxes),
+    Problem("e.10", "e10", "towers, splits and both", 20, _many_boxes),
 )

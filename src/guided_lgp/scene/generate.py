@@ -3,7 +3,7 @@
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, cycle
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from guided_lgp.errors import InputError
 from guided_lgp.scene.footprints import footprint, gap, inset
 from guided_lgp.scene.model import Box, Scene, Table, parse_scene
-from guided_lgp.scene.setups import BOX_SIZE, CLEARANCE, ROBOT, SETUPS, Setup
+from guided_lgp.scene.setups import CLEARANCE, ROBOT, SETUPS, Setup
 
 _VERSION = 1
 _MAX_DRAWS = 10_000
@@ -76,7 +76,7 @@ def generate(
     earlier ones as they were.
 
     Args:
-        setup: ``a``, ``b``, ``c`` or ``d``.
+        setup: one of :data:`guided_lgp.scene.setups.SETUPS`.
         count: how many.
         seed: of the random streams.
         prefix: of the scenes' names, ``prefix-000`` onwards.
@@ -131,10 +131,12 @@ def _draw_anywhere(setup: Setup, rng: np.random.Generator) -> tuple[Box, ...] | 
 
 
 def _draw_on_slots(setup: Setup, rng: np.random.Generator) -> tuple[Box, ...] | None:
-    """Boxes on distinct random slots; None if two are too close."""
-    chosen = rng.permutation(len(setup.slots))[: len(setup.boxes)]
+    """Boxes on distinct random slots of the start tables in turn; None if two are too close."""
+    shuffled = [setup.slots[index] for index in rng.permutation(len(setup.slots))]
+    slots = {table: [s for s in shuffled if s.table == table] for table in setup.start_tables}
     boxes = []
-    for name, slot in zip(setup.boxes, (setup.slots[index] for index in chosen), strict=True):
+    for name, table in zip(setup.boxes, cycle(setup.start_tables)):
+        slot = slots[table].pop(0)
         dx, dy = rng.uniform(-setup.jitter, setup.jitter, 2)
         yaw = rng.uniform(-setup.yaw_jitter, setup.yaw_jitter)
         boxes.append(_box(setup, name, slot.table, slot.x + dx, slot.y + dy, yaw))
@@ -142,9 +144,10 @@ def _draw_on_slots(setup: Setup, rng: np.random.Generator) -> tuple[Box, ...] | 
 
 
 def _box(setup: Setup, name: str, table: str, x: float, y: float, yaw: float) -> Box:
-    z = _table(setup, table).position[2] + BOX_SIZE[2] / 2
+    size = setup.box_size
+    z = _table(setup, table).position[2] + size[2] / 2
     position = (round(float(x), 6), round(float(y), 6), round(z, 6))
-    return Box(name=name, size=BOX_SIZE, position=position, yaw=round(float(yaw), 6), on=table)
+    return Box(name=name, size=size, position=position, yaw=round(float(yaw), 6), on=table)
 
 
 def _table(setup: Setup, name: str) -> Table:
