@@ -10,7 +10,7 @@ from pathlib import Path
 import coarse
 import path
 import search
-from guided_lgp.experiments.files import write_metrics
+from guided_lgp.documents import write_json
 from guided_lgp.paths import METRICS
 
 ROOT = Path(__file__).parents[1]
@@ -24,10 +24,10 @@ def main(count: int) -> None:
     logger.info("path bound: %d sequences per length", count)
     motions = path.measure(count)
     geometry = {length: {**figures, **motions[length]} for length, figures in keyframes.items()}
-    write_metrics(ROOT / METRICS / "geometry.json", geometry)
+    write_json(ROOT / METRICS / "geometry.json", geometry)
     logger.info("planners")
     figures = {"coarse_against_ipopt": against, **search.measure(ROOT)}
-    write_metrics(ROOT / METRICS / "benchmark.json", figures)
+    write_json(ROOT / METRICS / "benchmark.json", figures)
     logger.info("written: geometry.json, benchmark.json in %s", METRICS)
 
 

@@ -1,13 +1,30 @@
-"""Every way in which a JSON document can be unreadable is one line."""
+"""Every way in which a document cannot be read or written is one line."""
 
+import json
 import math
+from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from guided_lgp import documents
-from guided_lgp.documents import read_json
+from guided_lgp.documents import read_json, write_json, written_whole
 from guided_lgp.errors import InputError
+
+CONTENT = np.random.default_rng(1).bytes(2**20)
+WRITERS: dict[str, Callable[[Path], object]] = {
+    "file.json": lambda path: path.write_text(json.dumps(list(CONTENT))),
+    "file.npz": lambda path: np.savez_compressed(path, content=np.frombuffer(CONTENT, np.uint8)),
+    "file.parquet": lambda path: pq.write_table(pa.table({"content": [CONTENT]}), path),
+    "file.safetensors": lambda path: path.write_bytes(CONTENT),
+}
+
+
+def names(folder: Path) -> list[str]:
+    return [path.name for path in folder.iterdir()]
 
 
 def test_a_document(tmp_path: Path) -> None:
@@ -59,3 +76,60 @@ def test_no_number_is_lost(tmp_path: Path) -> None:
     file = tmp_path / "file.json"
     file.write_text(repr([math.pi, 5e-324, 1.7976931348623157e308]))
     assert read_json(file) == [math.pi, 5e-324, 1.7976931348623157e308]
+
+
+def test_what_is_written_is_read(tmp_path: Path) -> None:
+    file = tmp_path / "deep" / "file.json"
+    document = {"röd": [math.pi, -0.0, 2**60, None, "\ud800"]}
+    write_json(file, document)
+    assert read_json(file) == document
+    before = file.read_bytes()
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        write_json(file, {"share": float("nan")})
+    assert file.read_bytes() == before
+    assert names(file.parent) == ["file.json"]
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_a_full_disk_leaves_what_was_there(name: str, tmp_path: Path) -> None:
+    """Writing ends as on a full disk when the name to write to leads to /dev/full."""
+    file = tmp_path / name
+    file.write_text("what was there")
+
+    def write() -> None:
+        with written_whole(file) as unfinished:
+            unfinished.symlink_to("/dev/full")
+            WRITERS[name](unfinished)
+
+    with pytest.raises(InputError) as caught:
+        write()
+    message = str(caught.value)
+    assert message.startswith(f"{file}: cannot be written: ")
+    assert "No space left on device" in message
+    assert file.read_text() == "what was there"
+    assert names(tmp_path) == [name]
+    with written_whole(file) as unfinished:
+        WRITERS[name](unfinished)
+    assert file.stat().st_size >= 2**20
+
+
+def test_a_writer_that_was_killed_is_followed_by_another(tmp_path: Path) -> None:
+    file = tmp_path / "file.json"
+
+    def write() -> None:
+        with written_whole(file) as unfinished:
+            unfinished.write_text('{"half')
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write()
+    assert not file.exists()
+    write_json(file, {})
+    assert names(tmp_path) == ["file.json"]
+
+
+def test_a_folder_that_cannot_be_made(tmp_path: Path) -> None:
+    (tmp_path / "data").write_text("a file")
+    for path in (tmp_path / "data" / "file.json", Path("/proc/data/file.json")):
+        with pytest.raises(InputError, match=f"{path}: cannot be written: "):
+            write_json(path, {})

@@ -1,7 +1,9 @@
-"""JSON documents on disk: read with every fault in one line."""
+"""Documents on disk: read with every fault in one line, written whole or not at all."""
 
 import json
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -45,3 +47,43 @@ def _finite(text: str) -> float:
     if not math.isfinite(value):
         raise ValueError(f"{text[:20]} is not a finite number")
     return value
+
+
+def write_json(path: Path, document: Any) -> None:
+    """Write a JSON document, the same bytes for the same content.
+
+    Args:
+        path: the file; its folder is made.
+        document: what :mod:`json` can write, numbers finite.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    text = json.dumps(document, indent=1, allow_nan=False)
+    with written_whole(path) as unfinished:
+        unfinished.write_text(text + "\n", encoding="utf-8")
+
+
+@contextmanager
+def written_whole(path: Path) -> Iterator[Path]:
+    """Write a file such that nobody ever reads half of it, whatever ends the program or the disk.
+
+    Args:
+        path: the file; its folder is made. One process at a time writes it.
+
+    Yields:
+        The name to write to, beside the file and with its suffix; renamed at the end. After a
+        kill it stays, and the next writer uses it again.
+
+    Raises:
+        InputError: the file cannot be written: the disk is full, the folder is read-only.
+    """
+    unfinished = path.with_name(f".unfinished-{path.name}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        yield unfinished
+        unfinished.replace(path)
+    except OSError as error:
+        with suppress(OSError):
+            unfinished.unlink(missing_ok=True)
+        raise InputError(str(path), f"cannot be written: {error.strerror or error}") from error

@@ -7,7 +7,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from guided_lgp.errors import InputError
-from guided_lgp.experiments.files import read_table, write_metrics, write_table
+from guided_lgp.experiments.files import read_table, write_table
 
 TABLE = pa.table({"name": ["a", "b"], "value": [1, 2]})
 
@@ -38,8 +38,3 @@ def test_faults_name_the_stage(tmp_path: Path) -> None:
     write_table(path, TABLE)
     with pytest.raises(InputError, match=r"stage some_stage"):
         read_table(path, "some_stage", ["no such column"])
-
-
-def test_metrics_hold_numbers_only(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="not JSON compliant"):
-        write_metrics(tmp_path / "metrics.json", {"share": float("nan")})

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from guided_lgp.experiments.files import write_metrics, write_table
+from guided_lgp.documents import write_json
+from guided_lgp.experiments.files import write_table
 from guided_lgp.experiments.problems import PROBLEMS
 from guided_lgp.logic import (
     Skeleton,
@@ -145,7 +146,7 @@ def _write_generalization(root: Path, scenes: Any, rng: np.random.Generator) -> 
         }
         for planner, p in shares.items()
     }
-    write_metrics(root / METRICS / "generalization.json", metrics)
+    write_json(root / METRICS / "generalization.json", metrics)
 
 
 def _write_scalability(root: Path, scenes: Any) -> None:
@@ -187,8 +188,8 @@ def _write_scalability(root: Path, scenes: Any) -> None:
                 for key, share in zip(parts, (1, 0.1, 0.4, 0.01, 0.2, 0.39), strict=True)
             } | {"peak_rss_mb": 640.0}
     write_table(root / EVALUATION / "scalability.parquet", pa.Table.from_pylist(rows))
-    write_metrics(root / METRICS / "scalability.json", metrics)
-    write_metrics(root / METRICS / "scalability_timing.json", timing)
+    write_json(root / METRICS / "scalability.json", metrics)
+    write_json(root / METRICS / "scalability_timing.json", timing)
 
 
 def _training(classes: tuple[str, ...], rng: np.random.Generator) -> dict[str, Any]:

@@ -7,8 +7,8 @@ import outputs
 import pandas as pd
 import pytest
 
+from guided_lgp.documents import write_json
 from guided_lgp.errors import InputError
-from guided_lgp.experiments.files import write_metrics
 from guided_lgp.params import Params
 from guided_lgp.paths import METRICS
 from guided_lgp.report import render
@@ -99,7 +99,7 @@ def test_rendering_again_gives_the_same_bytes_and_geometry_is_optional(
     root = tmp_path / "again"
     shutil.copytree(rendered, root)
     (root / "reports/figures/old.png").touch()
-    write_metrics(root / METRICS / "geometry.json", outputs.geometry())
+    write_json(root / METRICS / "geometry.json", outputs.geometry())
     render.run(params, root)
     before = {
         path.relative_to(rendered): path.read_bytes()

@@ -17,7 +17,8 @@ from typing import Any
 import pyarrow as pa
 
 from guided_lgp import parallel
-from guided_lgp.experiments.files import write_metrics, write_table
+from guided_lgp.documents import write_json
+from guided_lgp.experiments.files import write_table
 from guided_lgp.experiments.memory import peak_mb, reset_peak
 from guided_lgp.experiments.problems import PROBLEMS
 from guided_lgp.logic import format_objective, format_skeleton
@@ -90,8 +91,8 @@ def run(params: Params, root: Path) -> None:
         [{name: row[name] for name in ROWS.names} for row in rows], schema=ROWS
     )
     write_table(root / EVALUATION / "scalability.parquet", table)
-    write_metrics(root / METRICS / "scalability.json", summarize(rows))
-    write_metrics(root / METRICS / "scalability_timing.json", summarize_times(rows))
+    write_json(root / METRICS / "scalability.json", summarize(rows))
+    write_json(root / METRICS / "scalability_timing.json", summarize_times(rows))
     for problem, planners in summarize(rows).items():
         solved = ", ".join(f"{name} {cell['solved']}" for name, cell in planners.items())
         logger.info("%s: solved: %s", problem, solved)

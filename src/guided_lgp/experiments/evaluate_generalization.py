@@ -16,7 +16,8 @@ from typing import Any
 import pyarrow as pa
 
 from guided_lgp import parallel
-from guided_lgp.experiments.files import read_table, write_metrics, write_table
+from guided_lgp.documents import write_json
+from guided_lgp.experiments.files import read_table, write_table
 from guided_lgp.logic import (
     Objective,
     Skeleton,
@@ -102,7 +103,7 @@ def run(params: Params, root: Path) -> None:
     table = pa.Table.from_pylist(rows, schema=ROWS)
     write_table(root / EVALUATION / "generalization.parquet", table)
     metrics = summarize(rows)
-    write_metrics(root / METRICS / "generalization.json", metrics)
+    write_json(root / METRICS / "generalization.json", metrics)
     for planner, subsets in metrics.items():
         shares = ", ".join(f"{name} {figures['shortest']:.1%}" for name, figures in subsets.items())
         logger.info("%s: shortest: %s", planner, shares)

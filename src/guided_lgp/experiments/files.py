@@ -1,13 +1,13 @@
-"""Tables and metrics on disk: written whole or not at all, refused if of another version."""
+"""Tables on disk: written whole or not at all, refused if of another version."""
 
-import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from guided_lgp.documents import written_whole
 from guided_lgp.errors import InputError
 
 _VERSION = b"1"
@@ -15,12 +15,14 @@ _KEY = b"guided_lgp"
 
 
 def write_table(path: Path, table: pa.Table) -> None:
-    """Write a Parquet file: under a temporary name, then renamed."""
+    """Write a Parquet file.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
     stamped = table.replace_schema_metadata({_KEY: _VERSION})
-    path.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = path.with_name(f".{path.name}.unfinished")
-    pq.write_table(stamped, unfinished)
-    unfinished.replace(path)
+    with written_whole(path) as unfinished:
+        pq.write_table(stamped, unfinished)
 
 
 def read_table(path: Path, stage: str, columns: Sequence[str]) -> list[dict[str, Any]]:
@@ -46,10 +48,3 @@ def read_table(path: Path, stage: str, columns: Sequence[str]) -> list[dict[str,
         fault = "is missing" if isinstance(error, FileNotFoundError) else "cannot be read"
         raise InputError(str(path), fault, remedy) from None
     return rows
-
-
-def write_metrics(path: Path, metrics: Mapping[str, Any]) -> None:
-    """Write metrics as JSON, the same bytes for the same figures."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    text = json.dumps(metrics, indent=1, allow_nan=False)
-    path.write_text(text + "\n", encoding="utf-8")

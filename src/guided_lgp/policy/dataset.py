@@ -8,6 +8,7 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
+from guided_lgp.documents import write_json, written_whole
 from guided_lgp.errors import InputError
 from guided_lgp.logic import Objective, Symbols, parse_objective
 from guided_lgp.policy.encoding import CHAINS, INSTRUCTIONS, VERSION, Encoding, FloatArray
@@ -93,17 +94,17 @@ class Dataset:
 
     def save(self, directory: Path) -> None:
         """Write ``samples.npz`` and ``dataset.json``; the same bytes for the same samples."""
-        directory.mkdir(parents=True, exist_ok=True)
-        np.savez_compressed(
-            directory / _SAMPLES,
-            states=self.states,
-            actions=self.actions,
-            supports=self.supports,
-            configuration=self.configuration,
-            goals=self.goals,
-            sample_state=self.sample_state,
-            sample_goals=self.sample_goals,
-        )
+        with written_whole(directory / _SAMPLES) as unfinished:
+            np.savez_compressed(
+                unfinished,
+                states=self.states,
+                actions=self.actions,
+                supports=self.supports,
+                configuration=self.configuration,
+                goals=self.goals,
+                sample_state=self.sample_state,
+                sample_goals=self.sample_goals,
+            )
         document = {
             "version": VERSION,
             "samples": len(self),
@@ -114,8 +115,7 @@ class Dataset:
             "configurations": self.configurations,
             "encoding": self.encoding.document(),
         }
-        text = json.dumps(document, indent=1)
-        (directory / _DOCUMENT).write_text(text + "\n", encoding="utf-8")
+        write_json(directory / _DOCUMENT, document)
 
 
 def load_dataset(directory: Path) -> Dataset:

@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from safetensors import SafetensorError
-from safetensors.numpy import load_file, save_file
+from safetensors.numpy import load_file, save
 
+from guided_lgp.documents import write_json, written_whole
 from guided_lgp.errors import InputError
 from guided_lgp.policy.encoding import CHAINS, VERSION, Encoding, FloatArray
 
@@ -28,7 +29,6 @@ class Model:
 
     def save(self, directory: Path) -> None:
         """Write ``<network>.safetensors`` and ``<network>.json``; same model, same bytes."""
-        directory.mkdir(parents=True, exist_ok=True)
         tensors = {}
         for name, layers in self.sub_policies.items():
             for index, (weight, bias) in enumerate(layers):
@@ -45,9 +45,9 @@ class Model:
             "training": self.training,
             "encoding": self.encoding.document(),
         }
-        save_file(tensors, directory / f"{self.network}.safetensors")
-        text = json.dumps(document, indent=1)
-        (directory / f"{self.network}.json").write_text(text + "\n", encoding="utf-8")
+        with written_whole(directory / f"{self.network}.safetensors") as unfinished:
+            unfinished.write_bytes(save(tensors))
+        write_json(directory / f"{self.network}.json", document)
 
 
 def load_model(directory: Path, network: str, stage: str = "train_policy") -> Model:

@@ -1,6 +1,5 @@
 """Trains a network: its sub-policies, side by side (paper, Sec. II-A and Appendix)."""
 
-import json
 import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from guided_lgp.documents import write_json
 from guided_lgp.errors import InputError
 from guided_lgp.parallel import run
 from guided_lgp.params import Network, Parallel, TrainPolicy
@@ -52,8 +52,7 @@ class TrainingReport:
 
     def save(self, path: Path) -> None:
         """Write the report as JSON."""
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(self.document(), indent=1) + "\n", encoding="utf-8")
+        write_json(path, self.document())
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from guided_lgp.experiments.files import write_metrics
+from guided_lgp.documents import write_json
 from guided_lgp.logic import parse_skeleton
 from guided_lgp.nlp.bounds import SceneBounds
 from guided_lgp.params import BoundsParams, Params
@@ -42,7 +42,7 @@ def run(params: Params, root: Path) -> None:
         shutil.rmtree(reports / folder, ignore_errors=True)
         (reports / folder).mkdir(parents=True)
     training = tables.training_metrics(inputs.training)
-    write_metrics(root / METRICS / "training.json", training)
+    write_json(root / METRICS / "training.json", training)
     written = {table.name: table for table in _tables(inputs, training)}
     for table in written.values():
         for suffix, text in (
