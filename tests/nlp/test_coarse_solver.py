@@ -1,11 +1,14 @@
 """The kernels' derivatives, the two solvers, and the compilation."""
 
 import logging
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from guided_lgp.errors import InputError
 from guided_lgp.logic import parse_skeleton
 from guided_lgp.nlp.coarse import compiler, solver
 from guided_lgp.nlp.coarse.formulation import Formulator, Margins, SceneGeometry
@@ -70,24 +73,43 @@ def test_variables_stay_within_their_bounds() -> None:
     assert np.all(values <= program.upper)
 
 
-def test_the_library_is_compiled_once(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    calls = []
+# One line per compilation; takes a while, as a compiler does.
+COMPILER = """#!/bin/sh
+echo compiled >> {log}
+while [ "$1" != -o ]; do shift; done
+sleep 1
+cp {library} "$2"
+"""
 
-    def pretend(command: list[str], code: Path, library: Path) -> bool:
-        calls.append(command)
-        library.write_bytes(existing.read_bytes())
-        return True
 
+def test_of_two_processes_one_compiles_and_the_other_waits(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     assert compiler.load_library() is not None
-    existing = next(compiler.cache_folder().glob("coarse-*.so"))
+    library = next(compiler.cache_folder().glob("coarse-*.so"))
+    stand_in = tmp_path / "bin" / "cc"
+    stand_in.parent.mkdir()
+    stand_in.write_text(COMPILER.format(log=tmp_path / "log", library=library))
+    stand_in.chmod(0o755)
+    monkeypatch.setenv("PATH", str(stand_in.parent), prepend=":")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    code = "from guided_lgp.nlp.coarse.compiler import load_library; assert load_library()"
+    both = [subprocess.Popen([sys.executable, "-c", code]) for _ in range(2)]
+    assert [process.wait(60) for process in both] == [0, 0]
+    assert compiler.load_library() is not None
+    assert (tmp_path / "log").read_text().count("compiled") == 1
+    assert not list((tmp_path / "cache" / "guided-lgp").glob("tmp*"))
+
+
+def test_a_cache_folder_that_cannot_be_written_is_named(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     description = pr2.urdf_path()
     monkeypatch.setattr(pr2, "urdf_path", lambda: description)
-    monkeypatch.setattr(compiler, "_compile", pretend)
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    assert compiler.load_library() is not None
-    assert compiler.load_library() is not None
-    assert len(calls) == 1
-    assert [file.suffix for file in (tmp_path / "guided-lgp").iterdir()] == [".so"]
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    with pytest.raises(InputError, match=r"guided-lgp: .*XDG_CACHE_HOME"):
+        compiler.load_library()
 
 
 def test_without_a_compiler_the_interpreter_takes_over_and_says_so_once(

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from guided_lgp.documents import write_json
 from guided_lgp.errors import InputError
 from guided_lgp.scene.footprints import footprint, gap, inset
 from guided_lgp.scene.model import Box, Scene, Table, parse_scene
@@ -35,8 +36,7 @@ class GeneratedScenes:
             "rejected": self.rejected,
             "scenes": [scene.model_dump(mode="json") for scene in self.scenes],
         }
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+        write_json(path, document)
 
 
 def load_scenes(path: Path) -> GeneratedScenes:

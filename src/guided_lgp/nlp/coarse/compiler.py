@@ -1,18 +1,21 @@
 """Compilation of the stage kernels with the solver's loop, once per content."""
 
 import ctypes
+import fcntl
 import os
 import shutil
 import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from hashlib import sha256
 from importlib.util import find_spec
 from pathlib import Path
 
 import casadi as ca
 
+from guided_lgp.errors import InputError
 from guided_lgp.nlp.coarse.kernels import kernels, reach
 
 _FLAGS = ("-O2", "-fPIC", "-shared", "-fno-math-errno")
@@ -57,8 +60,11 @@ def cache_folder() -> Path:
 def load_library() -> ctypes.CDLL | None:
     """The compiled solver, or None if it is not there and no compiler works.
 
-    The file's name depends on the content, and it is put in place atomically, so that several
-    processes may compile at the same time.
+    The file's name depends on the content, and it is put in place atomically. Of several processes
+    that need it, one compiles and the others wait.
+
+    Raises:
+        InputError: the cache folder cannot be written.
     """
     source = _source()
     digest = sha256("\n".join((source, sys.platform, *_FLAGS)).encode()).hexdigest()[:16]
@@ -67,14 +73,38 @@ def load_library() -> ctypes.CDLL | None:
         commands = list(_compilers())
         if not commands:
             return None
-        target.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=target.parent) as folder:
-            code, library = Path(folder) / "coarse.c", Path(folder) / "coarse.so"
-            code.write_text(source, encoding="utf-8")
-            if not any(_compile(command, code, library) for command in commands):
-                return None
-            library.replace(target)
+        try:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            with _alone(target.with_suffix(".lock")):
+                if not target.exists() and not _make(source, commands, target):
+                    return None
+        except OSError as error:
+            fault = error.strerror or "cannot be written"
+            raise InputError(str(target.parent), fault, "a writable $XDG_CACHE_HOME") from None
     return ctypes.CDLL(str(target))
+
+
+@contextmanager
+def _alone(file: Path) -> Iterator[None]:
+    """Wait until no other process is in here; the lock of one that dies ends with it.
+
+    Where the file system has no locks, nobody waits and the last one's result stays.
+    """
+    with file.open("w") as stream:
+        with suppress(OSError):
+            fcntl.flock(stream, fcntl.LOCK_EX)
+        yield
+
+
+def _make(source: str, commands: list[list[str]], target: Path) -> bool:
+    """Whether one of the compilers makes the library."""
+    with tempfile.TemporaryDirectory(dir=target.parent) as folder:
+        code, library = Path(folder) / "coarse.c", Path(folder) / "coarse.so"
+        code.write_text(source, encoding="utf-8")
+        if not any(_compile(command, code, library) for command in commands):
+            return False
+        library.replace(target)
+    return True
 
 
 def _compile(command: list[str], code: Path, library: Path) -> bool:
