@@ -1,5 +1,6 @@
 """Shards of the enumeration: resumed after an interruption, bound to what they depend on."""
 
+import shutil
 from pathlib import Path
 
 import pyarrow.parquet as pq
@@ -77,7 +78,8 @@ def test_an_interrupted_run_goes_on(
     enumerate_sequences.run(params, broken)
 
     assert scripted.opened == ["training-000", "training-001", "test-000", "test-001"]
-    assert not (broken / "data" / ".shards").exists()
+    for folder in (whole, broken):
+        assert len(list((folder / "data" / ".shards").iterdir())) == 4
     for name in OUTPUTS:
         path = Path("data") / "sequences" / name
         assert (whole / path).read_bytes() == (broken / path).read_bytes()
@@ -94,6 +96,19 @@ def test_shards_of_other_parameters_are_not_used(
     deeper = params.enumerate_sequences.model_copy(update={"max_length": 2})
     enumerate_sequences.run(params.model_copy(update={"enumerate_sequences": deeper}), root)
     assert scripted.opened.count("training-000") == 2
+    assert len(list((root / "data" / ".shards").iterdir())) == 4
+
+
+def test_a_run_that_was_killed_after_its_last_shard_recomputes_none(
+    tmp_path: Path, params: Params, scripted: type[OneHand]
+) -> None:
+    root = make_root(tmp_path)
+    enumerate_sequences.run(params, root)
+    (root / "data" / ".shards" / "half.unfinished").mkdir()
+    shutil.rmtree(root / "data" / "sequences")
+    enumerate_sequences.run(params, root)
+    assert len(scripted.opened) == 4
+    assert len(list((root / "data" / ".shards").iterdir())) == 4
 
 
 def test_what_the_tables_hold(tmp_path: Path, params: Params, scripted: type[OneHand]) -> None:

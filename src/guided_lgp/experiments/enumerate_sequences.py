@@ -2,12 +2,14 @@
 
 Each configuration is a shard that its worker writes as soon as it is done, outside the outputs
 that DVC deletes before it starts the stage: after a kill, only the shards in progress are redone.
-The name of a shard is a digest of all that it depends on, the source code included.
+The name of a shard is a digest of all that it depends on, the source code included. The shards stay
+until another run does not need them: DVC can be killed after the stage has ended.
 """
 
 import json
 import logging
 import shutil
+from collections.abc import Set
 from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
@@ -93,12 +95,9 @@ def run(params: Params, root: Path) -> None:
         name: [Task(scene, params.bounds, params.enumerate_sequences, folder) for scene in scenes]
         for name, scenes in splits.items()
     }
-    parallel.run(
-        write_shard,
-        [task for split in tasks.values() for task in split],
-        params.parallel,
-        "enumerate",
-    )
+    whole = [task for split in tasks.values() for task in split]
+    _remove_others(folder, {task.shard for task in whole})
+    parallel.run(write_shard, whole, params.parallel, "enumerate")
     for name, split in tasks.items():
         for part, suffix in (("verdicts", ""), ("shortest", "_shortest")):
             table = pa.concat_tables(
@@ -106,7 +105,13 @@ def run(params: Params, root: Path) -> None:
             )
             write_table(root / SEQUENCES / f"{name}{suffix}.parquet", table)
             logger.info("%s %s: %d rows", name, part, len(table))
-    shutil.rmtree(folder)
+
+
+def _remove_others(folder: Path, shards: Set[Path]) -> None:
+    """Remove what earlier runs left: shards of other content, and shards half-written."""
+    for found in folder.iterdir() if folder.is_dir() else ():
+        if found not in shards:
+            shutil.rmtree(found)
 
 
 def write_shard(task: Task) -> None:
