@@ -10,6 +10,7 @@ from guided_lgp.nlp.results import CoarseResult
 from guided_lgp.nlp.verify import verify_keyframes
 from guided_lgp.scene import Box, Robot, Scene, Table, generate, pr2
 from guided_lgp.scene.poses import tilt
+from guided_lgp.scene.setups import SETUPS
 from guided_lgp.scene.world import World
 
 SIZE = (0.15, 0.07, 0.10)
@@ -77,7 +78,7 @@ def test_feasible_sequences_are_found_and_true(bound: CoarseBound, text: str) ->
 
 def test_random_verdicts_are_true_in_every_setup() -> None:
     feasible = 0
-    for setup in "abcd":
+    for setup in SETUPS:
         scene = generate(setup, 1, 21, "x").scenes[0]
         bound = CoarseBound(scene, 9)
         for skeleton in _random_skeletons(scene, 5, 6, seed=5):

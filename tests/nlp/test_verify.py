@@ -229,6 +229,22 @@ def test_box_that_slips_in_the_hand(
     assert (found.constraint, found.action) == ("rigid red", 0)
 
 
+def test_keyframes_verified_before_are_only_where_the_others_start(
+    world: World, frames: tuple[list[Keyframe], list[Keyframe]]
+) -> None:
+    contacts, (carried, moved) = frames
+    nowhere = Keyframe(HOME + 10, contacts[0].boxes)
+    assert verify_keyframes(world, GRASP_AND_PLACE, contacts, [carried, moved], 1) is None
+    assert verify_keyframes(world, GRASP_AND_PLACE, [nowhere, contacts[1]], [carried, moved]) != (
+        verify_keyframes(world, GRASP_AND_PLACE, [nowhere, contacts[1]], [carried, moved], 1)
+    )
+    slipped = carried.boxes | {"red": compose(carried.boxes["red"], pose((0.004, 0, 0)))}
+    before = [Keyframe(HOME, slipped), moved]
+    found = verify_keyframes(world, GRASP_AND_PLACE, contacts, before, 1)
+    assert found is not None
+    assert (found.constraint, found.action) == ("rigid red", 1)
+
+
 def test_box_that_moves_by_itself(
     world: World, frames: tuple[list[Keyframe], list[Keyframe]]
 ) -> None:

@@ -80,8 +80,7 @@ class CoarseBound:
             prefix = self.solve(skeleton[:-1])
         if prefix is not None and not prefix.feasible:
             return CoarseResult(skeleton, feasible=False, failure=prefix.failure, tries=0)
-        known = prefix.values if isinstance(prefix, CoarseSolution) else None
-        result = self._search(skeleton, known)
+        result = self._search(skeleton, prefix if isinstance(prefix, CoarseSolution) else None)
         elapsed = time.perf_counter() - started
         return CoarseSolution(**(vars(result) | {"time_s": elapsed}))
 
@@ -100,13 +99,13 @@ class CoarseBound:
             if found == count:
                 return
 
-    def _search(self, skeleton: Skeleton, known: Array | None) -> CoarseSolution:
+    def _search(self, skeleton: Skeleton, prefix: CoarseSolution | None) -> CoarseSolution:
         """Start after start until one leads to a verified solution."""
         programs = _Programs(self._geometry, skeleton)
         failures: list[Failure] = []
         for attempt in range(self._tries):
             try:
-                result = self._attempt(programs, attempt, known)
+                result = self._attempt(programs, attempt, prefix)
             except UngraspableError as error:
                 failure = Failure(
                     error.action, f"width of {error.box}", error.width - GRASPABLE, "both sides"
@@ -121,9 +120,12 @@ class CoarseBound:
         failure = replace(failure, tried=f"{self._tries} starts of the coarse bound")
         return CoarseSolution(skeleton, feasible=False, failure=failure, tries=self._tries)
 
-    def _attempt(self, programs: "_Programs", attempt: int, known: Array | None) -> CoarseSolution:
+    def _attempt(
+        self, programs: "_Programs", attempt: int, prefix: CoarseSolution | None
+    ) -> CoarseSolution:
         """One start: the first and every other one keep the solution of the prefix."""
         formulation = programs[attempt]
+        known = None if prefix is None else prefix.values
         start = self._starts.draw(
             formulation,
             _generator(programs.skeleton, attempt),
@@ -131,18 +133,25 @@ class CoarseBound:
             known=known if attempt == 0 or attempt % 2 else None,
         )
         solution = self._solver.solve(formulation.program, start, self._settings)
-        return self._check(programs.skeleton, formulation, solution, attempt + 1)
+        kept = known is not None and np.array_equal(solution.values[: len(known)], known)
+        verified = len(programs.skeleton) - 1 if kept else 0
+        return self._check(programs.skeleton, formulation, solution, attempt + 1, verified)
 
     def _check(
-        self, skeleton: Skeleton, formulation: Formulation, solution: Solution, tries: int
+        self,
+        skeleton: Skeleton,
+        formulation: Formulation,
+        solution: Solution,
+        tries: int,
+        verified: int,
     ) -> CoarseSolution:
-        """Decode and verify a solution."""
+        """Decode a solution and verify it, from the first action on that is not verified yet."""
         if not solution.converged(self._settings):
             failure = _worst(formulation, solution, self._settings.slack)
             return CoarseSolution(skeleton, feasible=False, failure=failure, tries=tries)
         contacts = self._keyframes(formulation, formulation.contacts, solution.values)
         retreated = self._keyframes(formulation, formulation.retreated, solution.values)
-        found = verify_keyframes(self._world, skeleton, contacts, retreated)
+        found = verify_keyframes(self._world, skeleton, contacts, retreated, verified)
         if found is not None:
             failure = Failure(found.action, found.constraint, found.amount, "verification")
             return CoarseSolution(skeleton, feasible=False, failure=failure, tries=tries)

@@ -74,20 +74,31 @@ def verify_keyframes(
     skeleton: Skeleton,
     contacts: Sequence[Keyframe],
     retreated: Sequence[Keyframe],
+    verified: int = 0,
 ) -> Violation | None:
     """Check the keyframes of a skeleton, in the order in which they are reached.
 
     Besides each keyframe alone: a held box is rigid in its gripper's tool frame and a standing
     box rigid on its support, from each keyframe to the next.
 
+    Args:
+        world: of the scene.
+        skeleton: the actions.
+        contacts: one keyframe per action, at its switch.
+        retreated: one keyframe per action, after it.
+        verified: how many actions, the first ones, were checked before with these keyframes.
+
     Returns:
         The first violation with its action, or None.
     """
     state = world.scene.state
     start = Keyframe(pr2.HOME_CONFIGURATION, initial_poses(world.scene))
-    world.set(start.q, start.boxes)
-    last = _Modes(world, start)
-    for index, action in enumerate(skeleton):
+    for action in skeleton[:verified]:
+        state = successor(state, action)
+    before = retreated[verified - 1] if verified else start
+    world.set(before.q, before.boxes)
+    last = _Modes(world, before)
+    for index, action in enumerate(skeleton[verified:], verified):
         after = successor(state, action)
         moves = ((contacts[index], state, action), (retreated[index], after, None))
         for keyframe, modes, contact in moves:
