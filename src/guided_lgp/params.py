@@ -68,12 +68,19 @@ class Variant(_Section):
     adaptation asks for in planning; the paper adapts objectives in planning alone."""
     both_orders: Flag = True
     """Duplicate each sample for both orders of its goals."""
-    any_order_of_boxes: Flag = False
-    """Let the boxes of each sequence fill the slots in an order drawn at random. Their names mean
-    nothing, so that what is learnt about one box holds for all; note that an unseen objective may
-    then be a seen one with other names."""
+    boxes: Literal["declared", "random", "named_first"] = "declared"
+    """Which box fills which slot: as declared; for each sequence in an order drawn at random; or
+    those that the goals name first, in the order of the goals. Names of boxes mean nothing, and
+    with the last two what is learnt about one box holds for all: an unseen objective of two goals
+    is then, as a rule, a seen one with other names."""
+    relative: Flag = False
+    """Take positions relative to the box in the first slot, and that box's relative to the first
+    surface."""
     normalised: Flag = False
     """Shift and scale every coordinate to mean 0 and deviation 1 over the training states."""
+    meaning: Flag = False
+    """Add what the state means to the input: what each box stands on or is held by, and whether
+    each encoded goal holds."""
     chain: Flag = True
     """Feed each sub-policy with the decisions before it in its chain."""
 

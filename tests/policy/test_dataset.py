@@ -1,6 +1,7 @@
 import json
 from itertools import permutations
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -15,17 +16,16 @@ from guided_lgp.logic import (
     State,
     Symbols,
     format_objective,
-    parse_skeleton,
     progress,
     satisfied,
     two_goal_objectives,
     unsatisfied,
 )
+from guided_lgp.params import Variant
 from guided_lgp.policy.dataset import Dataset, load_dataset
 from guided_lgp.policy.encoding import INSTRUCTIONS
 from guided_lgp.policy.samples import build_dataset
 from guided_lgp.policy.split import training_objectives
-from guided_lgp.policy.variants import VARIANTS
 
 
 @pytest.fixture(scope="module")
@@ -94,47 +94,37 @@ def test_samples_are_those_of_the_definition(
     assert found_samples(dataset) == expected_samples(world, objectives, slack)
 
 
-def test_supports_are_those_of_the_symbolic_states(
-    world: Enumeration, objectives: list[Objective]
-) -> None:
-    dataset = build(world, objectives, "paper")
-    start = 0
+def test_supports_are_those_of_the_symbolic_states(world: Enumeration, dataset: Dataset) -> None:
     symbols = dataset.symbols
-    frame = pd.read_parquet(world.sequences)
+    expected = {}
     for scene in world.scenes:
-        rows = frame[frame["feasible"] & (frame["configuration"] == scene.name)]
-        for text in rows["skeleton"]:
-            path = parse_skeleton(text)
-            for length in range(len(path)):
-                state = progress(scene.state, path[:length])
-                below = dict(state.support) | dict(state.held)
-                places = [
-                    symbols.tables[code] if code >= 0 else symbols.grippers[-1 - code]
-                    for code in dataset.supports[start].tolist()
-                ]
-                assert places == [below[box] for box in symbols.boxes]
-                start += 1
-    assert start == len(dataset.supports)
+        for path in world.feasible[scene.name]:
+            state = progress(scene.state, path)
+            frame = positions_along(scene, path)[-1]
+            key = np.concatenate(list(frame.values())).astype(np.float32).tobytes()
+            expected[key] = dict(state.support + state.held)
+    for state, supports in zip(dataset.states, dataset.supports.tolist(), strict=True):
+        at = [symbols.tables[c] if c >= 0 else symbols.grippers[-1 - c] for c in supports]
+        assert dict(zip(symbols.boxes, at, strict=True)) == expected[state.tobytes()]
 
 
-def build(world: Enumeration, objectives: list[Objective], variant: str) -> Dataset:
-    return build_dataset(
-        world.scenes, world.sequences, world.shortest, objectives, 0, VARIANTS[variant]
-    )
+def build(world: Enumeration, objectives: list[Objective], **changes: Any) -> Dataset:
+    variant = Variant(**changes)
+    return build_dataset(world.scenes, world.sequences, world.shortest, objectives, 0, variant)
 
 
 def test_variant_with_adapted_goals(
     world: Enumeration, objectives: list[Objective], dataset: Dataset
 ) -> None:
-    variant = build(world, objectives, "adapted_goals")
+    variant = build(world, objectives, adapted_goals=True)
     assert found_samples(variant) == expected_samples(world, objectives, 0, adapt=True)
     assert found_samples(variant) > found_samples(dataset)
 
 
-def test_variant_with_any_order_of_boxes(
+def test_variant_with_boxes_in_random_order(
     world: Enumeration, objectives: list[Objective], dataset: Dataset
 ) -> None:
-    variant = build(world, objectives, "any_order_of_boxes")
+    variant = build(world, objectives, boxes="random")
     assert len(variant) == len(dataset)
     remaining = expected_samples(world, objectives, slack=0)
     symbols = variant.symbols
@@ -159,7 +149,7 @@ def test_variant_with_any_order_of_boxes(
 def test_variant_with_one_order(
     world: Enumeration, objectives: list[Objective], dataset: Dataset
 ) -> None:
-    variant = build(world, objectives, "one_order")
+    variant = build(world, objectives, both_orders=False)
     assert len(variant) == len(dataset) / 2
     goals = variant.goals[variant.sample_goals]
     assert {decode_goals(code, variant.symbols) for code in goals} <= set(objectives)
@@ -168,20 +158,72 @@ def test_variant_with_one_order(
 def test_variant_with_normalised_positions(
     world: Enumeration, objectives: list[Objective], dataset: Dataset
 ) -> None:
-    variant = build(world, objectives, "normalised")
+    variant = build(world, objectives, normalised=True)
     moving = np.ptp(dataset.states, axis=0) > 0
     assert np.abs(variant.states.mean(axis=0)).max() < 1e-4
     assert np.abs(variant.states.std(axis=0) - moving).max() < 1e-3
     scene = world.scenes[0]
     slots = variant.encoding.fill((), scene.state, scene.symbols)
-    start = variant.encoding.encode_state(slots, positions_along(scene, ())[0])
+    start = variant.encoding.encode_state(slots, scene.state, positions_along(scene, ())[0])
     assert (variant.states == start).all(axis=1).any()
+
+
+def test_variant_with_the_named_boxes_first(
+    world: Enumeration, objectives: list[Objective]
+) -> None:
+    variant = build(world, objectives, boxes="named_first")
+    remaining = expected_samples(world, objectives, slack=0)
+    assert len(variant) >= len(remaining)
+    symbols = variant.symbols
+    found = set()
+    for state, goals in zip(variant.sample_state, variant.sample_goals, strict=True):
+        for boxes in permutations(symbols.boxes):
+            order = [0, 1, *(2 + boxes.index(name) for name in symbols.boxes), 5, 6]
+            own = Symbols(symbols.grippers, boxes, symbols.surfaces)
+            decoded = decode_goals(variant.goals[goals], own)
+            world_order = variant.states[state].reshape(7, 3)[order].tobytes()
+            sample = decoded, world_order, decode_action(variant.actions[state], own)
+            named = dict.fromkeys(n for g in decoded for n in (g.box, g.table) if n in boxes)
+            if sample in remaining:
+                assert boxes[: len(named)] == tuple(named)
+                found.add(sample)
+    assert found == remaining
+
+
+def test_variant_with_relative_positions(
+    world: Enumeration, objectives: list[Objective], dataset: Dataset
+) -> None:
+    variant = build(world, objectives, relative=True)
+    there, here = (data.states.reshape(-1, 7, 3).astype(float) for data in (dataset, variant))
+    np.testing.assert_allclose(here[:, 2], there[:, 2] - there[:, 5], atol=1e-6)
+    for symbol in (0, 1, 3, 4, 5, 6):
+        np.testing.assert_allclose(here[:, symbol], there[:, symbol] - there[:, 2], atol=1e-6)
+
+
+def test_variant_with_what_the_state_means(
+    world: Enumeration, objectives: list[Objective], dataset: Dataset
+) -> None:
+    variant = build(world, objectives, meaning=True)
+    encoding, symbols = variant.encoding, variant.symbols
+    assert encoding.input_size == len(set(encoding.input_names)) == 41 + 2 + 3 * 7
+    assert (variant.states[:, :21] == dataset.states).all()
+    assert len(variant) == len(dataset)
+    for sample in range(0, len(variant), 50):
+        row = variant.sample_state[sample]
+        places = variant.states[row, 21:].reshape(3, 7)
+        assert (places.sum(axis=1) == 1).all()
+        names = (*symbols.tables, *symbols.grippers)
+        at = {box: names[code.argmax()] for box, code in zip(symbols.boxes, places, strict=True)}
+        for code in variant.goals[variant.sample_goals[sample]].reshape(2, 11):
+            (goal, _) = decode_goals(np.tile(code[:10], 2), symbols)
+            held = goal.kind == "held" and at[goal.box] in symbols.grippers
+            assert code[10] == (held or at[goal.box] == goal.table)
 
 
 def test_variant_without_chain(
     world: Enumeration, objectives: list[Objective], dataset: Dataset
 ) -> None:
-    variant = build(world, objectives, "no_chain")
+    variant = build(world, objectives, chain=False)
     samples = variant.of_network("place")
     inputs, classes = variant.tensors("place", "table", samples)
     assert inputs.shape == (len(samples), 41)

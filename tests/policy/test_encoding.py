@@ -3,7 +3,7 @@ import pytest
 
 from guided_lgp.errors import InputError
 from guided_lgp.logic import Action, State, Symbols, parse_objective
-from guided_lgp.policy.encoding import CHAINS, Encoding
+from guided_lgp.policy.encoding import CHAINS, NOWHERE, Encoding
 
 ENCODING = Encoding()
 ON_TABLES = State.of({"red": "tab1", "green": "tab1", "blue": "tab2"})
@@ -30,7 +30,7 @@ def test_sizes() -> None:
 )
 def test_goals_by_hand(symbols: Symbols, goals: list[str], expected: str) -> None:
     slots = ENCODING.fill(parse_objective(goals), ON_TABLES, symbols)
-    code = ENCODING.encode_goals(slots)
+    code = ENCODING.encode_goals(slots, ON_TABLES)
     assert code.tolist() == [float(digit) for digit in expected.replace(" ", "")]
 
 
@@ -38,7 +38,7 @@ def test_state_is_the_position_of_every_symbol_in_order(symbols: Symbols) -> Non
     names = ("pr2L", "pr2R", "red", "green", "blue", "tab1", "tab2")
     positions = {name: np.array([i, i + 0.25, i + 0.5]) for i, name in enumerate(names)}
     shuffled = {name: positions[name] for name in sorted(names)}
-    code = ENCODING.encode_state(ENCODING.fill((), ON_TABLES, symbols), shuffled)
+    code = ENCODING.encode_state(ENCODING.fill((), ON_TABLES, symbols), ON_TABLES, shuffled)
     assert code.dtype == np.float32
     assert code.tolist() == [
         *(0, 0.25, 0.5, 1, 1.25, 1.5),
@@ -121,7 +121,7 @@ def test_slots_without_a_symbol_are_empty_and_zero() -> None:
     slots = ENCODING.fill(parse_objective(["(held red)"]), state, symbols)
     assert slots.symbols == ("pr2L", "pr2R", "red", None, None, "tab1", None)
     positions = {name: np.ones(3) for name in ("pr2L", "pr2R", "red", "tab1")}
-    code = ENCODING.encode_state(slots, positions).reshape(7, 3)
+    code = ENCODING.encode_state(slots, ON_TABLES, positions).reshape(7, 3)
     assert code.tolist() == [[float(name is not None)] * 3 for name in slots.symbols]
 
 
@@ -130,7 +130,7 @@ def test_normalised_positions_by_hand() -> None:
     encoding = Encoding(centre=(0.5, 0.0, 1.0) * 7, scale=(2.0, 1.0, 0.5) * 7)
     slots = encoding.fill((), State.of({"red": "tab1", "green": "tab1"}), symbols)
     positions = {name: np.array([2.5, 1.0, 0.0]) for name in slots.symbols if name}
-    code = encoding.encode_state(slots, positions).reshape(7, 3)
+    code = encoding.encode_state(slots, ON_TABLES, positions).reshape(7, 3)
     assert code[[0, 1, 2, 3, 5, 6]].tolist() == [[1, 1, -2]] * 6
     assert code[4].tolist() == [0, 0, 0]
 
@@ -165,3 +165,32 @@ def test_documents_of_another_encoding_are_refused(change: dict[str, object]) ->
 def test_something_else_is_refused() -> None:
     with pytest.raises(InputError, match=r"x\.json: encoding.*train_policy"):
         Encoding.parse([1], "x.json", "train_policy")
+
+
+def test_named_boxes_fill_the_first_slots(symbols: Symbols) -> None:
+    encoding = Encoding(named_first=True)
+
+    def boxes(*goals: str, state: State = ON_TAB1) -> tuple[str | None, ...]:
+        return encoding.fill(parse_objective(goals), state, MANY).boxes
+
+    assert boxes("(on blue grey)") == ("blue", "grey", "red")
+    assert boxes("(held grey)", "(on green tray)") == ("grey", "green", "red")
+    held = State.of({box: "tab1" for box in MANY.boxes if box != "pink"}, {"pink": "pr2L"})
+    assert boxes("(on blue tab2)", state=held) == ("blue", "pink", "red")
+    fewer = Symbols(symbols.grippers, ("red", "green"), symbols.surfaces)
+    slots = encoding.fill(parse_objective(["(held green)"]), ON_TABLES, fewer)
+    assert slots.boxes == ("green", "red", None)
+
+
+def test_what_the_state_means_by_hand(symbols: Symbols) -> None:
+    encoding = Encoding(meaning=True)
+    state = State.of({"red": "tray", "green": "red"}, {"blue": "pr2R"})
+    slots = encoding.fill(parse_objective(["(held blue)", "(on red tab1)"]), state, MANY)
+    assert encoding.encode_supports(slots, state) == (NOWHERE, 2, -2), "the tray has no slot"
+    positions = dict.fromkeys((*MANY.grippers, *MANY.boxes, *MANY.surfaces), np.zeros(3))
+    code = encoding.encode_state(slots, state, positions)
+    assert not code[:21].any()
+    #                              tab1 tab2 red green blue | pr2L pr2R
+    expected = "00000 00" + "00100 00" + "00000 01"
+    assert code[21:].tolist() == [float(digit) for digit in expected.replace(" ", "")]
+    assert encoding.encode_goals(slots, state)[[10, 21]].tolist() == [1, 0]

@@ -77,7 +77,10 @@ def test_scores_are_the_product_of_the_conditionals_of_torch(
     objective, state, positions = situation
     encoding, networks = Encoding(), classifiers(Encoding())
     slots = encoding.fill(objective, state, scene.symbols)
-    code = [*encoding.encode_goals(slots), *encoding.encode_state(slots, positions)]
+    code = [
+        *encoding.encode_goals(slots, state),
+        *encoding.encode_state(slots, state, positions),
+    ]
 
     def conditional(network: str, name: str, previous: list[float], chosen: int) -> float:
         with torch.inference_mode():
@@ -204,5 +207,5 @@ def test_the_improved_policy_has_a_folder_of_its_own(models: Path) -> None:
     save(models / "improved", Encoding(chain=False))
     assert not load_policy(models, "improved").encoding.chain
     assert load_policy(models).encoding.chain
-    with pytest.raises(InputError, match="policy 'other': is unknown .accepted: paper, improved"):
+    with pytest.raises(InputError, match=r"policy 'other': is unknown .*paper, improved"):
         load_policy(models, "other")

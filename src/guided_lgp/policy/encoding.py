@@ -28,7 +28,11 @@ CHAINS: Mapping[str, tuple[str, ...]] = {
 }
 """The sub-policies of each network in the order of its classifier chain."""
 
+NOWHERE = 127
+"""The code of a box that is at no table or gripper of the slots."""
+
 _SLOTS = ("grippers", "boxes", "surfaces", "goals")
+_FLAGS = ("chain", "named_first", "relative", "meaning")
 
 FloatArray = NDArray[np.float32]
 
@@ -61,8 +65,11 @@ class Encoding:
     no table), then the world x, y, z in m of every gripper, box and surface. With the default
     numbers of slots these are 2 · (2 + 3 + 5) + 7 · 3 = 41 numbers. An empty slot is zero.
 
-    The paper takes positions as they are. A variant that normalises them gives ``centre`` and
-    ``scale``, one number each per coordinate of the state: (position - centre) / scale.
+    The paper takes positions as they are. What differs in a variant is listed here; see
+    :class:`guided_lgp.params.Variant`. One that normalises positions gives ``centre`` and
+    ``scale``, one number each per coordinate: (position - centre) / scale. One that adds what the
+    state means has one more number per goal, whether it holds, and, after the positions, for every
+    box the one-hot of the table or gripper that it is at.
     """
 
     grippers: int = 2
@@ -71,18 +78,30 @@ class Encoding:
     goals: int = 2
     chain: bool = True
     """Whether sub-policies see the decisions before them in the chain."""
+    named_first: bool = False
+    """Whether the boxes that goals name fill the first slots, in the order of the goals."""
+    relative: bool = False
+    """Whether positions are relative to the box in the first slot."""
+    meaning: bool = False
+    """Whether the input says what the state means."""
     centre: tuple[float, ...] = ()
     scale: tuple[float, ...] = ()
 
     @property
     def goal_size(self) -> int:
         """Length of one encoded goal."""
-        return len(GOAL_KINDS) + self.boxes + self.surfaces + self.boxes
+        return len(GOAL_KINDS) + self.boxes + self.surfaces + self.boxes + self.meaning
+
+    @property
+    def position_size(self) -> int:
+        """Number of coordinates in the encoded state."""
+        return 3 * (self.grippers + self.boxes + self.surfaces)
 
     @property
     def state_size(self) -> int:
         """Length of the encoded state."""
-        return 3 * (self.grippers + self.boxes + self.surfaces)
+        places = self.surfaces + self.boxes + self.grippers
+        return self.position_size + self.meaning * self.boxes * places
 
     @property
     def input_size(self) -> int:
@@ -99,10 +118,13 @@ class Encoding:
             *GOAL_KINDS,
             *(f"box={name}" for name in boxes),
             *(f"table={name}" for name in surfaces + boxes),
+            *["holds"] * self.meaning,
         ]
+        places = (surfaces + boxes + grippers) * self.meaning
         return (
             *(f"goal{index} {name}" for index in range(1, self.goals + 1) for name in goal),
             *(f"{name} {axis}" for name in grippers + boxes + surfaces for axis in "xyz"),
+            *(f"{box} at {place}" for box in boxes for place in places),
         )
 
     def classes(self, sub_policy: str) -> int:
@@ -129,7 +151,7 @@ class Encoding:
         than there are slots, only the first of them. The slots then take the symbols that these
         goals name, the boxes that are held, and the others as declared, until they are full. A
         symbol whose place in the declaration is a slot keeps that slot, so that nothing moves
-        in a problem that fits.
+        in a problem that fits; unless boxes that are named come first.
         """
         goals = objective
         if len(goals) > self.goals or len(_boxes(goals, symbols)) > self.boxes:
@@ -141,13 +163,19 @@ class Encoding:
         named = [goal.table for goal in goals if goal.table in symbols.surfaces]
         return Slots(
             grippers=_fill(self.grippers, symbols.grippers, ()),
-            boxes=_fill(self.boxes, symbols.boxes, [*_boxes(goals, symbols), *held]),
+            boxes=_fill(
+                self.boxes, symbols.boxes, [*_boxes(goals, symbols), *held], self.named_first
+            ),
             surfaces=_fill(self.surfaces, symbols.surfaces, [name for name in named if name]),
             goals=goals,
         )
 
-    def encode_goals(self, slots: Slots) -> FloatArray:
+    def encode_goals(self, slots: Slots, state: State) -> FloatArray:
         """The encoded objective g; one goal is encoded as the same goal twice (DESIGN §5).
+
+        Args:
+            slots: which symbol fills which slot, and the goals to encode.
+            state: the symbolic state, for an encoding that says which goals hold.
 
         Returns:
             (goals · goal_size,) zeros and ones.
@@ -159,32 +187,58 @@ class Encoding:
             code[row, len(GOAL_KINDS) + slots.boxes.index(goal.box)] = 1
             if goal.table is not None:
                 code[row, len(GOAL_KINDS) + self.boxes + slots.tables.index(goal.table)] = 1
+            if self.meaning:
+                code[row, -1] = satisfied(state, (goal,))
         return code.ravel()
 
     def encode_state(
-        self, slots: Slots, positions: Mapping[str, NDArray[np.float64]]
+        self, slots: Slots, state: State, positions: Mapping[str, NDArray[np.float64]]
     ) -> FloatArray:
         """The encoded state s_k.
 
         Args:
             slots: which symbol fills which slot.
+            state: the symbolic state, for an encoding that says what the state means.
             positions: world position (3,) in m of every symbol.
 
         Returns:
-            (state_size,) positions in m, or normalised; zeros for an empty slot.
+            (state_size,) positions in m unless normalised; zeros for an empty slot.
         """
         empty = [name is None for name in slots.symbols]
         world = [np.zeros(3) if name is None else positions[name] for name in slots.symbols]
-        code = self.scaled(np.concatenate(world).astype(np.float32)).reshape(-1, 3)
+        code = self.coordinates(np.concatenate(world).astype(np.float32)).reshape(-1, 3)
         code[empty] = 0
-        return code.ravel()
+        if not self.meaning:
+            return code.ravel()
+        supports = np.array(self.encode_supports(slots, state))
+        return np.concatenate([code.ravel(), self.encode_places(supports)])
 
-    def scaled(self, states: FloatArray) -> FloatArray:
-        """Normalise positions (..., state_size), if this encoding does."""
+    def coordinates(self, positions: FloatArray) -> FloatArray:
+        """World positions (..., position_size) in m as this encoding has them."""
+        if self.relative:
+            symbols = positions.reshape(*positions.shape[:-1], -1, 3)
+            first, surface = self.grippers, self.grippers + self.boxes
+            moved = symbols - symbols[..., first : first + 1, :]
+            moved[..., first, :] = symbols[..., first, :] - symbols[..., surface, :]
+            positions = moved.reshape(positions.shape)
         if not self.scale:
-            return states
+            return positions
         centre, scale = (np.array(part, dtype=np.float32) for part in (self.centre, self.scale))
-        return (states - centre) / scale
+        return (positions - centre) / scale
+
+    def encode_places(self, supports: NDArray[np.integer[Any]]) -> FloatArray:
+        """One-hots of what :meth:`encode_supports` returns: of tables, then of grippers.
+
+        Args:
+            supports: (..., boxes).
+
+        Returns:
+            (..., boxes · (tables + grippers)); zeros for a box at none of them.
+        """
+        tables = self.surfaces + self.boxes
+        codes = np.array([*range(tables), *(-1 - gripper for gripper in range(self.grippers))])
+        one_hot: FloatArray = np.equal(supports[..., None], codes).astype(np.float32)
+        return one_hot.reshape(*supports.shape[:-1], -1)
 
     def encode_action(self, slots: Slots, action: Action) -> tuple[int, int, int, int] | None:
         """The classes of an action: instruction, gripper, box, table (-1 for a grasp).
@@ -204,21 +258,25 @@ class Encoding:
         )
 
     def encode_supports(self, slots: Slots, state: State) -> tuple[int, ...]:
-        """What each box stands on or is held by, for boxes and supports that all have slots.
+        """What each box stands on or is held by.
 
         Returns:
-            (boxes,) the class of the table that a box stands on, or -1 - g if gripper g holds it.
+            (boxes,) the class of the table that a box stands on, or -1 - g if gripper g holds it;
+            :data:`NOWHERE` for an empty slot or a support that fills none.
         """
-        below = {name: slots.tables.index(table) for name, table in state.support}
-        below |= {name: -1 - slots.grippers.index(gripper) for name, gripper in state.held}
-        return tuple(below[name] for name in slots.boxes if name is not None)
+        codes = {name: row for row, name in enumerate(slots.tables) if name is not None}
+        codes |= {name: -1 - row for row, name in enumerate(slots.grippers) if name is not None}
+        at = dict(state.support + state.held)
+        return tuple(
+            NOWHERE if name is None else codes.get(at[name], NOWHERE) for name in slots.boxes
+        )
 
     def document(self) -> dict[str, Any]:
         """What is saved as JSON with the data set and the weights."""
         return {
             "version": VERSION,
             "slots": {name: getattr(self, name) for name in _SLOTS},
-            "chain": self.chain,
+            **{name: getattr(self, name) for name in _FLAGS},
             "normalisation": {"centre": list(self.centre), "scale": list(self.scale)},
             "inputs": list(self.input_names),
         }
@@ -242,12 +300,12 @@ class Encoding:
         try:
             encoding = cls(
                 **document["slots"],
-                chain=document["chain"],
+                **{name: document[name] for name in _FLAGS},
                 centre=tuple(document["normalisation"]["centre"]),
                 scale=tuple(document["normalisation"]["scale"]),
             )
             faithful = document == encoding.document()
-            faithful &= len(encoding.scale) in (0, encoding.state_size)
+            faithful &= len(encoding.scale) in (0, encoding.position_size)
             faithful &= len(encoding.scale) == len(encoding.centre)
         except (KeyError, TypeError, ValueError):
             faithful = False
@@ -279,10 +337,19 @@ def _supports_first(goals: Objective) -> Objective:
     return tuple(ordered)
 
 
-def _fill(count: int, declared: Sequence[str], first: Iterable[str]) -> tuple[str | None, ...]:
-    """Fill slots with ``first``, then with the others; whoever has a slot of its own keeps it."""
+def _fill(
+    count: int, declared: Sequence[str], first: Iterable[str], in_order: bool = False
+) -> tuple[str | None, ...]:
+    """Fill slots with ``first``, then with the others; whoever has a slot of its own keeps it.
+
+    Args:
+        count: the number of slots.
+        declared: all symbols.
+        first: those that are to have a slot in any case.
+        in_order: leave nobody where it is; the slots are taken in order.
+    """
     chosen = list(dict.fromkeys((*first, *declared)))[:count]
-    slots = [name if name in chosen else None for name in declared[:count]]
+    slots = [None if in_order or name not in chosen else name for name in declared[:count]]
     slots += [None] * (count - len(slots))
     moved = iter([name for name in chosen if name not in slots])
     return tuple(name if name is not None else next(moved, None) for name in slots)

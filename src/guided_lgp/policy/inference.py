@@ -10,10 +10,12 @@ from guided_lgp.errors import InputError
 from guided_lgp.logic import Action, Objective, State, Symbols
 from guided_lgp.policy.encoding import CHAINS, INSTRUCTIONS, Encoding, FloatArray
 from guided_lgp.policy.models import Layers, Model, load_model
+from guided_lgp.policy.relational.inference import RelationalPolicy, load_relational
 from guided_lgp.scene import GRIPPERS
 
-POLICIES = ("paper", "improved")
-"""The trained policies: the paper's networks, and the same ones with the improved recipe."""
+POLICIES = ("paper", "improved", "relational")
+"""The trained policies: the paper's networks, the same ones with the improved recipe, and one
+network for any number of symbols."""
 
 FLOOR = np.log(1e-6)
 """Log-probability of an action on a symbol that fills no slot: the networks cannot see it, and a
@@ -51,7 +53,10 @@ class HierarchicalPolicy:
         )
         slots = self.encoding.fill(objective, state, symbols)
         code = np.concatenate(
-            [self.encoding.encode_goals(slots), self.encoding.encode_state(slots, positions)]
+            [
+                self.encoding.encode_goals(slots, state),
+                self.encoding.encode_state(slots, state, positions),
+            ]
         )
         instruction = _log_softmax(_forward(self._chains["instruction"][0], code[None]))[0]
         joint = {
@@ -67,7 +72,9 @@ class HierarchicalPolicy:
         return scores
 
 
-def load_policy(directory: Path, name: str = "paper") -> HierarchicalPolicy:
+def load_policy(
+    directory: Path, name: str = "paper"
+) -> HierarchicalPolicy | RelationalPolicy:
     """Read a trained policy; torch is not needed.
 
     Args:
@@ -81,6 +88,8 @@ def load_policy(directory: Path, name: str = "paper") -> HierarchicalPolicy:
     """
     if name not in POLICIES:
         raise InputError(f"policy {name!r}", "is unknown", ", ".join(POLICIES))
+    if name == "relational":
+        return load_relational(directory)
     stage = "train_policy"
     if name == "improved":
         directory, stage = directory / name, "train_improved"

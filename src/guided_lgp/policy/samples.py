@@ -62,49 +62,62 @@ def build_dataset(
     Raises:
         InputError: a file is missing or does not fit the scenes; no sample results.
     """
-    encoding = Encoding(chain=variant.chain)
+    encoding = Encoding(
+        chain=variant.chain,
+        named_first=variant.boxes == "named_first",
+        relative=variant.relative,
+        meaning=variant.meaning,
+    )
     symbols = _common_symbols(scenes, encoding)
     lengths = _shortest_lengths(shortest, scenes, objectives)
     verdicts = _read(sequences, ["configuration", "skeleton", "feasible", "states"])
     feasible = verdicts[verdicts["feasible"].astype(bool)]
     rows_of = {str(name): rows for name, rows in feasible.groupby("configuration")}
-    goals = _GoalCodes(objectives, encoding, variant)
-    slots = [encoding.fill((), scenes[0].state, symbols)]
-    if variant.any_order_of_boxes:
-        slots = [replace(slots[0], boxes=boxes) for boxes in permutations(symbols.boxes)]
+    goals = _GoalCodes(objectives, symbols, encoding, variant)
+    declared = Slots(symbols.grippers, symbols.boxes, symbols.surfaces, goals=())
+    orders = [replace(declared, boxes=boxes) for boxes in permutations(symbols.boxes)]
 
     states, actions, supports, configuration = [], [], [], []
     sample_state, sample_goals = [], []
     first = 0
     for index, scene in enumerate(scenes):
         rows = rows_of.get(scene.name, feasible.iloc[:0])
-        rng = np.random.default_rng(np.random.SeedSequence([seed, index]))
-        chosen = [slots[draw] for draw in rng.integers(len(slots), size=len(rows))]
-        paths = _feasible_sequences(scene, rows, chosen, encoding, str(sequences))
+        slots = [declared] * len(rows)
+        if variant.boxes == "random":
+            rng = np.random.default_rng(np.random.SeedSequence([seed, index]))
+            slots = [orders[draw] for draw in rng.integers(len(orders), size=len(rows))]
+        elif variant.boxes == "named_first":  # the goals choose among all orders
+            slots = [order for order in orders for _ in range(len(rows))]
+            rows = pd.concat([rows] * len(orders))
+        paths = _feasible_sequences(scene, rows, slots, encoding, str(sequences))
         wanted = _wanted(paths, objectives, lengths[index], slack)
         step, objective = np.nonzero(wanted[paths.sequence])
         codes = goals.rows(paths)[step, objective]
         sample, _ = np.nonzero(codes != _NONE)
-        sample_state.append(first + step[sample])
+        used, state = np.unique(step[sample], return_inverse=True)
+        sample_state.append(first + state)
         sample_goals.append(codes[codes != _NONE])
-        states.append(paths.states)
-        actions.append(paths.actions)
-        supports.append(paths.supports)
-        configuration.append(np.full(len(paths.states), index, dtype=np.int16))
-        first += len(paths.states)
+        states.append(paths.states[used])
+        actions.append(paths.actions[used])
+        supports.append(paths.supports[used])
+        configuration.append(np.full(len(used), index, dtype=np.int16))
+        first += len(used)
 
     if not sum(map(len, sample_state)):
         fault = "no training objective has a feasible sequence"
         raise InputError(str(sequences), fault, _ENUMERATION)
-    positions = np.concatenate(states)
     if variant.normalised:
-        encoding = _normalising(encoding, positions)
+        encoding = _normalising(encoding, encoding.coordinates(np.concatenate(states)))
+    encoded = encoding.coordinates(np.concatenate(states))
+    if variant.meaning:
+        places = encoding.encode_places(np.concatenate(supports))
+        encoded = np.concatenate([encoded, places], axis=1)
     return Dataset(
         encoding=encoding,
         symbols=symbols,
         objectives=tuple(objectives),
         configurations=tuple(scene.name for scene in scenes),
-        states=encoding.scaled(positions),
+        states=encoded,
         actions=np.concatenate(actions),
         supports=np.concatenate(supports),
         configuration=np.concatenate(configuration),
@@ -125,7 +138,7 @@ class _Sequences:
     sequence: IntArray
     """(M,) the sequence that each step belongs to."""
     states: FloatArray
-    """(M, state_size) encoded states s_k before each step."""
+    """(M, position_size) world positions (m) of the slots before each step."""
     actions: NDArray[np.int8]
     """(M, 4) classes of each step's action."""
     supports: NDArray[np.int8]
@@ -146,14 +159,14 @@ def _feasible_sequences(
         return known[skeleton]
 
     skeletons = [parse_skeleton(text) for text in rows["skeleton"]]
-    states = [np.zeros((0, encoding.state_size), dtype=np.float32)]
+    states = [np.zeros((0, encoding.position_size), dtype=np.float32)]
     for skeleton, flat, own in zip(skeletons, rows["states"], slots, strict=True):
-        size = (len(skeleton) + 1) * encoding.state_size
+        size = (len(skeleton) + 1) * encoding.position_size
         if flat is None or len(flat) != size:
             raise InputError(where, f"states of {scene.name}: not {size} numbers", _ENUMERATION)
         positions = np.asarray(flat, np.float32).reshape(-1, len(stored), 3)[:-1]
         order = [stored.index(name) for name in own.symbols if name is not None]
-        states.append(positions[:, order].reshape(-1, encoding.state_size))
+        states.append(positions[:, order].reshape(-1, encoding.position_size))
     classes = [
         encoding.encode_action(own, action)
         for path, own in zip(skeletons, slots, strict=True)
@@ -195,19 +208,25 @@ class _GoalCodes:
     """The distinct encoded objectives, and which of them each sample has."""
 
     def __init__(
-        self, objectives: Sequence[Objective], encoding: Encoding, variant: Variant
+        self,
+        objectives: Sequence[Objective],
+        symbols: Symbols,
+        encoding: Encoding,
+        variant: Variant,
     ) -> None:
         self.codes: list[FloatArray] = []
+        self._symbols = symbols
         self._objectives = objectives
         self._encoding = encoding
         self._variant = variant
-        self._row: dict[Slots, int] = {}
+        self._row: dict[bytes, int] = {}
         self._rows_in: dict[tuple[State, Slots], IntArray] = {}
 
     def rows(self, paths: _Sequences) -> IntArray:
         """(steps, objectives, 4) the rows in ``codes`` of each objective at each step.
 
-        The last axis has the objective and the adapted objective, each in both orders, or -1.
+        The last axis has the objective and the adapted objective, each in both orders, or -1, also
+        where goals that choose the slots choose others.
         """
         per_step = [
             self._rows(state, slots)
@@ -221,23 +240,28 @@ class _GoalCodes:
         if known is None:
             known = np.full((len(self._objectives), 4), _NONE)
             for row, objective in zip(known, self._objectives, strict=True):
-                row[:2] = self._orders(objective, slots)
+                row[:2] = self._orders(objective, slots, state)
                 remaining = unsatisfied(state, objective)
                 if self._variant.adapted_goals and remaining not in ((), objective):
-                    row[2:] = self._orders(remaining, slots)
+                    row[2:] = self._orders(remaining, slots, state)
             self._rows_in[state, slots] = known
         return known
 
-    def _orders(self, goals: Objective, slots: Slots) -> tuple[int, int]:
+    def _orders(self, goals: Objective, slots: Slots, state: State) -> tuple[int, int]:
         reverse = goals[::-1]
-        other = self._code(replace(slots, goals=reverse)) if self._variant.both_orders else _NONE
-        return self._code(replace(slots, goals=goals)), other
+        other = self._code(reverse, slots, state) if self._variant.both_orders else _NONE
+        return self._code(goals, slots, state), other
 
-    def _code(self, slots: Slots) -> int:
-        if slots not in self._row:
-            self._row[slots] = len(self.codes)
-            self.codes.append(self._encoding.encode_goals(slots))
-        return self._row[slots]
+    def _code(self, goals: Objective, slots: Slots, state: State) -> int:
+        if self._encoding.named_first:
+            chosen = self._encoding.fill(goals, state, self._symbols)
+            if chosen.boxes != slots.boxes:
+                return _NONE
+        code = self._encoding.encode_goals(replace(slots, goals=goals), state)
+        if code.tobytes() not in self._row:
+            self._row[code.tobytes()] = len(self.codes)
+            self.codes.append(code)
+        return self._row[code.tobytes()]
 
 
 def _normalising(encoding: Encoding, states: FloatArray) -> Encoding:
