@@ -1,6 +1,5 @@
 """The outputs of all earlier stages with made-up figures, so that the report can be rendered."""
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -25,12 +24,16 @@ from guided_lgp.policy.encoding import CHAINS
 from guided_lgp.scene import Scene, generate
 from guided_lgp.scene.pr2 import ARM_JOINTS, HOME_CONFIGURATION
 
-TREE = {
-    "breadth_first": (400.0, 3000.0, 44000.0, 216000.0, None, None, None),
-    "guided": (24.0, 46.0, 47.0, 99.0, 97.0, 140.0, 116.0),
-    "guided_best_first": (24.0, 50.0, 47.0, 95.0, 98.0, 130.0, 118.0),
-    "breadth_first_graph": (150.0, 40.0, 700.0, 5200.0, 9000.0, 60000.0, 150000.0),
-    "astar": (60.0, 120.0, 90.0, 300.0, 260.0, 900.0, 800.0),
+TREE: dict[str, tuple[float | None, ...]] = {
+    "breadth_first": (400.0, 3000.0, 44000.0, 216000.0, *[None] * 6),
+    "guided": (24.0, 46.0, 47.0, 99.0, 97.0, 140.0, 116.0, 300.0, 900.0, 2500.0),
+    "guided_best_first": (24.0, 50.0, 47.0, 95.0, 98.0, 130.0, 118.0, 290.0, 800.0, 2400.0),
+    "improved": (24.0, 44.0, 47.0, 93.0, 96.0, 130.0, 115.0, 290.0, 700.0, 2000.0),
+    "improved_best_first": (24.0, 43.0, 47.0, 92.0, 97.0, 120.0, 117.0, 280.0, 690.0, 1900.0),
+    "relational": (24.0, 43.0, 47.0, 92.0, 96.0, 110.0, 115.0, 200.0, 320.0, 480.0),
+    "relational_best_first": (24.0, 42.0, 47.0, 91.0, 96.0, 109.0, 115.0, 198.0, 318.0, 470.0),
+    "breadth_first_graph": (150.0, 40.0, 700.0, 5200.0, 9000.0, 60000.0, 150000.0, *[None] * 3),
+    "astar": (60.0, 120.0, 90.0, 300.0, 260.0, 900.0, 800.0, 2000.0, 9000.0, None),
 }
 """Tree size by planner, in the order of the problems; None: stopped at the limit."""
 
@@ -45,7 +48,8 @@ CLASSES = {
 def write_outputs(root: Path) -> None:
     """Write what the stages before render_reports write, below a folder."""
     rng = np.random.default_rng(0)
-    sets = {"training": "a", "test": "a"} | {f"scalability_{s}": s for s in "abcd"}
+    setups = list(dict.fromkeys(problem.setup for problem in PROBLEMS))
+    sets = {"training": "a", "test": "a"} | {f"scalability_{s}": s for s in setups}
     scenes = {}
     for number, (name, setup) in enumerate(sets.items()):
         kept = generate(setup, 2, number, name.replace("_", "-"))
@@ -55,18 +59,13 @@ def write_outputs(root: Path) -> None:
         rows = [row for scene in scenes[split] for row in _verdicts(scene, rng)]
         write_table(root / SEQUENCES / f"{split}.parquet", pa.Table.from_pylist(rows))
     _write_generalization(root, scenes["test"], rng)
-    _write_scalability(root, {setup: scenes[f"scalability_{setup}"] for setup in "abcd"})
-    for network, chain in CHAINS.items():
-        report = {
-            "version": 1,
-            "network": network,
-            "seed": 5,
-            "samples": 1000,
-            "sub_policies": {name: _training(CLASSES[name], rng) for name in chain},
-        }
-        path = root / TRAINING / f"{network}.json"
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(report), encoding="utf-8")
+    _write_scalability(root, {setup: scenes[f"scalability_{setup}"] for setup in setups})
+    chains = {f"{network}.json": chain for network, chain in CHAINS.items()}
+    chains |= {f"improved/{file}": chain for file, chain in chains.items()}
+    for file, chain in (chains | {"relational.json": ("action",)}).items():
+        sub_policies = {name: _training(CLASSES.get(name), rng) for name in chain}
+        report = {"version": 1, "seed": 5, "samples": 1000, "sub_policies": sub_policies}
+        write_json(root / TRAINING / file, report)
 
 
 def geometry() -> dict[str, dict[str, float]]:
@@ -114,6 +113,8 @@ def _verdicts(scene: Scene, rng: np.random.Generator) -> list[dict[str, Any]]:
 def _write_generalization(root: Path, scenes: Any, rng: np.random.Generator) -> None:
     shares = {"default": (0.9, 0.09, 0.01), "adaptation": (0.95, 0.045, 0.005)}
     shares["best_first"] = (0.99, 0.01, 0.0)
+    shares |= {f"improved_{name}": share for name, share in shares.items()}
+    shares |= {"relational": (0.995, 0.005, 0.0), "relational_best_first": (1.0, 0.0, 0.0)}
     symbols = scenes[0].symbols
     objectives = one_goal_objectives(symbols) + two_goal_objectives(symbols)
     rows = [
@@ -123,6 +124,8 @@ def _write_generalization(root: Path, scenes: Any, rng: np.random.Generator) -> 
             "unseen": len(objective) == 1,
             "planner": planner,
             "outcome": str(rng.choice(["shortest", "feasible", "no_solution"], p=p)),
+            "length": 4,
+            "policy_calls": 6,
         }
         for scene in scenes
         for objective in objectives
@@ -166,6 +169,7 @@ def _write_scalability(root: Path, scenes: Any) -> None:
                     "solved": size is not None,
                     "reason": "stopped" if size is None else None,
                     "skeleton": "(grasp pr2L red) (place pr2L red tab1)" if size else None,
+                    "policy_calls": problem.k_min,
                 }
                 for scene in kept
                 for objective in objectives
@@ -192,7 +196,7 @@ def _write_scalability(root: Path, scenes: Any) -> None:
     write_json(root / METRICS / "scalability_timing.json", timing)
 
 
-def _training(classes: tuple[str, ...], rng: np.random.Generator) -> dict[str, Any]:
+def _training(classes: tuple[str, ...] | None, rng: np.random.Generator) -> dict[str, Any]:
     epochs = np.arange(1, 61)
     curves = {
         "training_loss": (0.3 + epochs**-0.3).tolist(),
@@ -205,10 +209,13 @@ def _training(classes: tuple[str, ...], rng: np.random.Generator) -> dict[str, A
         "loss": curves["validation_loss"][-1],
         "epochs": 60,
         "best_epoch": 60,
-        "confusion": rng.integers(0, 500, (len(classes), len(classes))).tolist(),
         "curves": curves,
     }
-    return {"classes": classes, **figures, "by_configuration": figures}
+    trained = {**figures, "by_configuration": figures}
+    if classes is not None:
+        confusion = rng.integers(0, 500, (len(classes), len(classes))).tolist()
+        trained |= {"classes": classes, "confusion": confusion}
+    return trained
 
 
 class Bounds:

@@ -1,6 +1,7 @@
 import pandas as pd
 import pytest
 
+from guided_lgp.logic import Goal, Symbols
 from guided_lgp.report import analysis
 from guided_lgp.scene import Box, Scene, Table
 
@@ -87,3 +88,33 @@ def test_without_failures_the_table_is_empty() -> None:
     columns = ["configuration", "failure_constraint", "failure_action"]
     verdicts = pd.DataFrame([("s", None, None)], columns=columns).assign(feasible=True)
     assert analysis.failures(verdicts, {"s": SCENE}).empty
+
+
+def test_novelty_is_up_to_the_names_of_the_boxes() -> None:
+    symbols = Symbols(("pr2L",), ("red", "green"), ("tab1", "tab2"))
+    kinds = analysis.novelty(symbols, [(Goal("held", "red"), Goal("on", "green", "tab1"))])
+    assert kinds["(held red) (on green tab1)"] == "seen"
+    assert kinds["(held green) (on red tab1)"] == "renamed"
+    assert kinds["(held red) (on green tab2)"] == "new"
+    assert kinds["(held red)"] == "new"
+
+
+def test_shares_by_novelty_leave_out_what_holds_at_the_start() -> None:
+    rows = [("(held red)", "shortest"), ("(held red)", "trivial"), ("(held green)", "feasible")]
+    problems = pd.DataFrame(rows, columns=["objective", "outcome"]).assign(planner="default")
+    shares = analysis.by_novelty(problems, {"(held red)": "seen", "(held green)": "new"})
+    assert shares.to_dict("records") == [
+        {"planner": "default", "kind": "new", "n": 1, "shortest": 0.0},
+        {"planner": "default", "kind": "seen", "n": 1, "shortest": 1.0},
+    ]
+
+
+def test_policy_calls_count_solved_problems_only() -> None:
+    problems = pd.DataFrame(
+        {"planner": "default", "length": [4, None, 2], "policy_calls": [6, 90, 2]}
+    )
+    assert analysis.calls_per_action(problems) == {"default": 1.25}
+    runs = pd.DataFrame({"problem": "a.1", "planner": "guided"}, index=range(2)).assign(
+        solved=[True, False], policy_calls=[5, 90]
+    )
+    assert analysis.policy_calls(runs) == {("a.1", "guided"): 5.0}

@@ -4,7 +4,7 @@ from guided_lgp.report import paper
 
 def test_problems_are_those_of_the_experiments() -> None:
     ours = {problem.name: problem for problem in problems.PROBLEMS}
-    assert list(ours) == [problem.name for problem in paper.PROBLEMS]
+    assert list(ours)[:7] == [problem.name for problem in paper.PROBLEMS]
     for printed in paper.PROBLEMS:
         problem = ours[printed.name]
         boxes = ["red", "green", "blue", "yellow", "purple"][

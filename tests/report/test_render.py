@@ -14,40 +14,58 @@ from guided_lgp.paths import METRICS
 from guided_lgp.report import render
 from guided_lgp.report.readme import readme_block
 
-FIGURES = {"scalability", "success", "learning_curves", "confusion", "feasible_share", "failures"}
+FIGURES = {"headline", "scalability", "success", "learning_curves", "confusion"}
+FIGURES |= {"feasible_share", "failures"}
+SETUPS = ("a", "b", "c", "d", "e6", "e8", "e10")
+REPLAYS = ("a", "b", "c", "d", "e10")
 
 
 def test_everything_is_written(rendered: Path) -> None:
     reports = rendered / "reports"
     figures = {path.name for path in (reports / "figures").iterdir()}
-    pictures = {f"setup_{setup}.png" for setup in "abcd"}
+    pictures = {f"setup_{setup}.png" for setup in SETUPS}
     assert figures == {f"{n}.{s}" for n in FIGURES for s in ("png", "svg")} | pictures
     tables = {path.name for path in (reports / "tables").iterdir()}
-    names = {"table_1", "training", "enumeration", "table_3_details"}
+    names = {"table_1", "unseen", "training", "enumeration", "table_3_details"}
     names |= {"table_3_tree_size", "table_3_time"}
     assert tables == {f"{n}.{s}" for n in names for s in ("md", "tex", "csv")}
     assert {path.name for path in (reports / "replays").iterdir()} == {
-        f"{setup}.html" for setup in "abcd"
+        f"{setup}.html" for setup in REPLAYS
     }
 
 
+def rows_of(table: Path) -> list[list[str]]:
+    """Cells of the rows of a Markdown table, headings left out."""
+    lines = [line for line in table.read_text(encoding="utf-8").splitlines() if line[:1] == "|"]
+    return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines[2:]]
+
+
 def test_table_1_stands_beside_the_papers(rendered: Path) -> None:
+    rows = rows_of(rendered / "reports/tables/table_1.md")
+    shown = {tuple(row[:3]): row[3:5] + row[-2:] for row in rows}
+    assert len(rows) == len(shown) == 10
+    assert shown["Paper's networks", "default", "paper"] == ["91.9%", "90.3%", "1740", "940"]
+    assert shown["Paper's networks", "default", "ours"] == ["90.0%", "90.0%", "170", "90"]
+    assert shown["Improved networks", "best-first", "ours"][:2] == ["99.0%", "99.0%"]
+    assert shown["Relational policy", "best-first", "ours"][:2] == ["100.0%", "100.0%"]
+    assert {row[-3] for row in rows} == {"–", "1.50"}
+
+
+def test_unseen_objectives_are_told_apart(rendered: Path) -> None:
     text = (rendered / "reports/report.md").read_text(encoding="utf-8")
-    row = next(line for line in text.splitlines() if line.startswith("| Shortest solution"))
-    cells = [cell.strip() for cell in row.strip("|").split("|")][1:]
-    assert cells == [
-        *("91.9%", "90.0%", "90.3%", "90.0%"),
-        *("98.5%", "95.0%", "98.2%", "95.0%"),
-        *("99.0%", "99.0%"),
-    ]
-    counts = next(line for line in text.splitlines() if line.startswith("| Problems n"))
-    assert counts.split("|")[2:6] == [" 1740 ", " 170 ", " 940 ", " 90 "]
+    assert "Of the 47 unseen objectives, 29 (61.7%)" in text
+    frame = pd.read_csv(rendered / "reports/tables/unseen.csv")
+    assert set(frame["kind"]) == {"seen", "renamed", "new"}
+    assert frame.groupby("planner")["n"].sum().eq(174).all()
 
 
 def test_a_stopped_planner_has_no_number(rendered: Path) -> None:
-    text = (rendered / "reports/tables/table_3_tree_size.md").read_text(encoding="utf-8")
-    row = next(line for line in text.splitlines() if line.startswith("| c.2"))
-    assert row.split("|")[5:7] == [" – ", " – (1/12) "]
+    path = rendered / "reports/tables/table_3_tree_size.md"
+    text = path.read_text(encoding="utf-8")
+    rows = {tuple(row[:2]): row[2:] for row in rows_of(path)}
+    assert rows["Breadth-first", "paper"][4:] == ["–", "–", "–", "", "", ""]
+    assert rows["Breadth-first", "ours"][3:5] == ["216,000 ± 21,600", "– (1/12)"]
+    assert rows["Problems n", "paper"] == ["9", "8", "6", "6", "6", "6", "6", "", "", ""]
     assert "stopped at the limit" in text
     for path in (rendered / "reports").rglob("table_3*"):
         assert "12345" not in path.read_text(encoding="utf-8").replace(",", "")
@@ -55,14 +73,24 @@ def test_a_stopped_planner_has_no_number(rendered: Path) -> None:
         assert "12345" not in (rendered / "reports" / name).read_text(encoding="utf-8")
     tidy = pd.read_csv(rendered / "reports/tables/table_3_tree_size.csv")
     ours = tidy[(tidy["source"] == "ours") & (tidy["planner"] == "breadth_first")]
-    assert ours.set_index("problem")["mean"].isna().sum() == 3
+    assert ours.set_index("problem")["mean"].isna().sum() == 6
+
+
+def test_curves_have_a_file_per_sub_policy(rendered: Path) -> None:
+    folder = rendered / "reports/curves"
+    names = {path.stem for path in folder.iterdir()}
+    assert len(names) == 13
+    assert {"paper_instruction", "improved_place_table", "relational_relational_action"} <= names
+    curves = pd.read_csv(folder / "paper_place_table.csv")
+    assert curves["epoch"].tolist() == list(range(1, 61))
+    assert {"training_loss", "validation_loss"} <= set(curves.columns)
 
 
 def test_the_page_needs_no_other_file_but_replays(rendered: Path) -> None:
     page = (rendered / "reports/report.html").read_text(encoding="utf-8")
     addresses = re.findall(r'(?:src|href)="([^"]*)"', page)
     outside = [a for a in addresses if not a.startswith(("data:", "#"))]
-    assert outside == [f"replays/{setup}.html" for setup in "abcd"]
+    assert outside == [f"replays/{setup}.html" for setup in REPLAYS]
     for address in outside:
         assert (rendered / "reports" / address).is_file()
     anchors = [a[1:] for a in addresses if a.startswith("#")]
@@ -73,11 +101,15 @@ def test_the_page_needs_no_other_file_but_replays(rendered: Path) -> None:
 
 def test_training_metrics(rendered: Path) -> None:
     metrics = json.loads((rendered / METRICS / "training.json").read_text(encoding="utf-8"))
-    assert {network: list(chain) for network, chain in metrics.items()} == {
+    improved, relational = metrics.pop("improved"), metrics.pop("relational")
+    chains = {
         "instruction": ["instruction"],
         "grasp": ["gripper", "box"],
         "place": ["gripper", "box", "table"],
     }
+    for networks in (metrics, improved):
+        assert {network: list(chain) for network, chain in networks.items()} == chains
+    assert list(relational["relational"]) == ["action"]
     table = metrics["place"]["table"]
     assert table["epochs"] == 60
     assert 0 < table["accuracy"] < 1
@@ -87,7 +119,7 @@ def test_training_metrics(rendered: Path) -> None:
 def test_readme_block_holds_the_tables(rendered: Path, tmp_path: Path) -> None:
     block = readme_block(rendered)
     assert block.count("**Table I") == 3
-    assert "| d.2 | 10 |" in block
+    assert "K = 20: e.10" in block
     with pytest.raises(InputError, match="render_reports"):
         readme_block(tmp_path)
 
@@ -126,6 +158,8 @@ def test_rendering_again_gives_the_same_bytes_and_geometry_is_optional(
         ("reports/metrics/generalization.json", "evaluate_generalization"),
         ("reports/metrics/scalability_timing.json", "compare_scalability"),
         ("reports/training/place.json", "train_policy@place"),
+        ("reports/training/improved/place.json", "train_improved@place"),
+        ("reports/training/relational.json", "train_relational"),
         ("data/sequences/test.parquet", "enumerate_sequences"),
         ("data/evaluation/generalization.parquet", "evaluate_generalization"),
         ("data/scenes/scalability_b.json", "generate_scenes"),

@@ -1,12 +1,24 @@
 """What verdicts and outcomes say, as small tables of numbers."""
 
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import replace
+from itertools import permutations
 from typing import Any
 
 import pandas as pd
 
-from guided_lgp.logic import Goal, State, parse_skeleton, progress
+from guided_lgp.logic import (
+    Goal,
+    Objective,
+    State,
+    Symbols,
+    format_objective,
+    one_goal_objectives,
+    parse_skeleton,
+    progress,
+    two_goal_objectives,
+)
 from guided_lgp.scene import GRIPPERS, Scene
 
 BOX, HELD_BOX = "box", "held box"
@@ -35,6 +47,85 @@ def outcomes(problems: pd.DataFrame, scenes: Mapping[str, Scene]) -> pd.DataFram
     pairs = zip(counted["objective"], counted["configuration"], strict=True)
     kinds = [objective_kind(text, scenes[name].symbols.boxes) for text, name in pairs]
     return counted[["planner", "outcome"]].assign(kind=kinds)
+
+
+SEEN, RENAMED, NEW = "seen", "renamed", "new"
+
+
+def novelty(symbols: Symbols, training: Iterable[Objective]) -> dict[str, str]:
+    """How new every objective of one and two goals is, by its text.
+
+    Args:
+        symbols: of the setup.
+        training: the objectives that the policy was trained on.
+
+    Returns:
+        ``seen``: drawn for training; ``renamed``: not, but a training objective becomes it when
+        the boxes are renamed; ``new``: neither.
+    """
+    seen = {frozenset(objective) for objective in training}
+    renamed = {
+        frozenset(_rename(goal, dict(zip(symbols.boxes, names, strict=True))) for goal in objective)
+        for objective in seen
+        for names in permutations(symbols.boxes)
+    }
+    kinds = {}
+    for objective in one_goal_objectives(symbols) + two_goal_objectives(symbols):
+        goals = frozenset(objective)
+        unseen = RENAMED if goals in renamed else NEW
+        kinds[format_objective(objective)] = SEEN if goals in seen else unseen
+    return kinds
+
+
+def _rename(goal: Goal, names: Mapping[str, str]) -> Goal:
+    table = goal.table and names.get(goal.table, goal.table)
+    return replace(goal, box=names[goal.box], table=table)
+
+
+def by_novelty(problems: pd.DataFrame, kinds: Mapping[str, str]) -> pd.DataFrame:
+    """Share of problems with a shortest solution by planner and novelty of the objective.
+
+    Args:
+        problems: columns planner, objective and outcome.
+        kinds: see :func:`novelty`.
+
+    Returns:
+        Columns planner, kind, n (problems not satisfied at the start), shortest.
+    """
+    counted = problems[problems["outcome"] != "trivial"]
+    frame = pd.DataFrame(
+        {
+            "planner": counted["planner"],
+            "kind": counted["objective"].map(kinds),
+            "shortest": counted["outcome"] == "shortest",
+        }
+    )
+    groups: Any = frame.groupby(["planner", "kind"])["shortest"]
+    return pd.DataFrame({"n": groups.size(), "shortest": groups.mean()}).reset_index()
+
+
+def calls_per_action(problems: pd.DataFrame) -> dict[str, float]:
+    """Mean number of policy calls per action of the plan, by planner, over the problems solved.
+
+    Args:
+        problems: columns planner, length and policy_calls; the last two empty without a plan.
+    """
+    solved = problems[problems["length"].notna() & (problems["length"] > 0)]
+    ratios = solved["policy_calls"] / solved["length"]
+    return {
+        str(name): float(mean) for name, mean in ratios.groupby(solved["planner"]).mean().items()
+    }
+
+
+def policy_calls(runs: pd.DataFrame) -> dict[tuple[str, str], float]:
+    """Mean number of policy calls by problem and planner, over the problems solved.
+
+    Args:
+        runs: columns problem, planner, solved and policy_calls.
+    """
+    solved = runs[runs["solved"].astype(bool)]
+    means: Any = solved.groupby(["problem", "planner"])["policy_calls"].mean()
+    return {key: float(mean) for key, mean in means.items()}
 
 
 def by_length(verdicts: pd.DataFrame) -> list[dict[str, Any]]:

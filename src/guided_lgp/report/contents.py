@@ -1,6 +1,7 @@
 """The report's sections: which table and which figure stands where, and what is said about it."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 from guided_lgp.params import Params
 from guided_lgp.report import findings
@@ -8,6 +9,7 @@ from guided_lgp.report.document import (
     Block,
     Bullets,
     Document,
+    Folded,
     Gallery,
     Links,
     Picture,
@@ -34,50 +36,76 @@ DIFFERENCES = (
 """Where this work departs from the paper, or had to choose."""
 
 
+@dataclass(frozen=True)
+class Calls:
+    """How often policies were asked, over the problems solved."""
+
+    per_action: Mapping[str, float]
+    """By planner of the test of generalization: mean number of calls per action of the plan."""
+    by_problem: Mapping[tuple[str, str], float]
+    """By problem and planner of the test of scalability: mean number of calls."""
+
+
 def compose(
     inputs: Inputs,
     params: Params,
+    novelty: Mapping[str, str],
+    calls: Calls,
     tables: Mapping[str, Table],
-    setups: Sequence[str],
     replays: Sequence[tuple[str, str]],
+    studies: str | None,
 ) -> Document:
     """Arrange the report.
 
     Args:
-        inputs: for the sentences.
+        inputs: for the sentences and the pictures of the setups.
         params: for the seeds.
+        novelty: of every objective.
+        calls: for the sentences.
         tables: by name.
-        setups: letters of the setups that have a picture ``setup_<letter>.png``.
         replays: (address, text) of every replay.
+        studies: address of the studies' page, if they were made.
     """
     generalization: list[Block] = [
-        Bullets(findings.generalization(inputs.generalization)),
+        Bullets(findings.generalization(inputs.generalization, calls.per_action)),
         tables["table_1"],
+        findings.unseen(novelty),
+        tables["unseen"],
         Picture(
             "success.svg",
             "Outcomes by type of objective",
             "Test configurations; n: problems not satisfied at the start, per planner.",
         ),
     ]
+    if studies is not None:
+        generalization.append(
+            Links([(studies, "Spread over draws of the training objectives and seeds; ablations")])
+        )
     scalability: list[Block] = [
-        Bullets(findings.scalability(inputs.scalability, inputs.timing)),
+        Picture(
+            "headline.svg",
+            "Tree size and time against the number of actions",
+            "Means over all problems of the same K, slightly shifted sideways to keep planners "
+            "apart. Dashed: greedy; solid: best-first and planners without a policy. Open markers: "
+            "the paper's means. Crosses: stopped at the limit of the tree size (dotted).",
+        ),
+        Bullets(findings.scalability(inputs.scalability, inputs.timing, calls.by_problem)),
         tables["table_3_tree_size"],
         tables["table_3_time"],
         Picture(
             "scalability.svg",
-            "Tree size and time against the smallest number of actions",
-            "Means and standard deviations over the problems of Table III (n there), slightly "
-            "shifted sideways to keep planners apart. Open markers: the paper's means. Crosses: "
-            "stopped at the limit of the tree size (dotted).",
+            "Tree size and times by type of problem",
+            "Means and standard deviations over the problems of Table III (n there). Without the "
+            "path bound: symbolic, policy and coarse time. Markers as above.",
         ),
-        tables["table_3_details"],
+        Folded(tables["table_3_details"]),
     ]
     policy: list[Block] = [
         tables["training"],
         Picture(
             "learning_curves.svg",
             "Learning curves",
-            "Training with dropout, validation without, on the randomly chosen samples.",
+            "Training (thin) with dropout, validation without, on the randomly chosen samples.",
         ),
         Picture(
             "confusion.svg",
@@ -87,7 +115,7 @@ def compose(
         ),
     ]
     geometry: list[Block] = [
-        Gallery([Picture(f"setup_{s}.png", f"Setup {s}") for s in setups]),
+        Gallery([Picture(f"setup_{s}.png", f"Setup {s}") for s in inputs.setups]),
         tables["enumeration"],
         Picture(
             "feasible_share.svg",
@@ -113,7 +141,7 @@ def compose(
         Section("Reproduction", [*_reproduction(params)]),
     ]
     if replays:
-        text = "Plans as 3D replays in the browser (one file each, a minute at most to load)."
+        text = "Plans as 3D replays in the browser, one self-contained page each."
         sections.insert(4, Section("Replays", [text, Links(replays)]))
     return Document(
         "Guided sequential manipulation planning: results",

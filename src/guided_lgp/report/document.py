@@ -43,17 +43,25 @@ class Links:
     items: Sequence[tuple[str, str]]
 
 
+@dataclass(frozen=True)
+class Folded:
+    """A long table that a page shows on demand."""
+
+    table: Table
+
+
 _KINDS = {
     "paragraph": str,
     "bullets": Bullets,
     "table": Table,
+    "folded": Folded,
     "picture": Picture,
     "gallery": Gallery,
     "links": Links,
 }
 """How the templates call the kinds of blocks."""
 
-Block = str | Bullets | Table | Picture | Gallery | Links
+Block = str | Bullets | Table | Folded | Picture | Gallery | Links
 
 
 @dataclass(frozen=True)

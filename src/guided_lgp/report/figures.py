@@ -1,6 +1,7 @@
 """The figures of the report, as matplotlib figures, and their deterministic saving."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +11,18 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from guided_lgp.experiments.problems import Problem
 from guided_lgp.report import paper
-from guided_lgp.report.inputs import Metrics
-from guided_lgp.report.style import PLANNER_COLORS, PLANNER_MARKERS, PLANNERS, VARIANTS
+from guided_lgp.report.inputs import Metrics, compared
+from guided_lgp.report.style import (
+    PLANNER_STYLES,
+    PLANNERS,
+    POLICIES,
+    POLICY_COLORS,
+    RIVALS,
+    VARIANTS,
+)
+from guided_lgp.report.tables import search_time
 
 COLUMN = 3.45
 """Width of a column of a two-column page (in)."""
@@ -44,11 +54,6 @@ _STYLE: dict[Any, Any] = {
     "savefig.dpi": 200,
 }
 
-QUANTITIES = {
-    "tree_size": ("tree_size_mean", "tree_size_std"),
-    "time": ("time_mean_s", "time_std_s"),
-}
-
 OUTCOMES = {
     "shortest": ("Shortest", "#0072B2"),
     "feasible": ("Feasible, longer", "#9CC8E3"),
@@ -72,93 +77,170 @@ def _subplots(
     return figure, figure.subplots(rows, columns, squeeze=False, **options)
 
 
+@dataclass(frozen=True)
+class Quantity:
+    """What is drawn against the number of actions."""
+
+    title: str
+    mean: str
+    std: str
+    source: Metrics
+    """By problem and planner; a mean is None where there is none."""
+    printed: bool = True
+    """Whether the paper has it."""
+
+
+def _quantities(metrics: Metrics, timing: Metrics) -> tuple[Quantity, Quantity, Quantity]:
+    without_path = {
+        problem: {planner: {"mean": search_time(cell), "std": 0.0} for planner, cell in row.items()}
+        for problem, row in timing.items()
+    }
+    return (
+        Quantity("Tree size (nodes)", "tree_size_mean", "tree_size_std", metrics),
+        Quantity("Time to a plan (s)", "time_mean_s", "time_std_s", timing),
+        Quantity("Without the path bound (s)", "mean", "std", without_path, printed=False),
+    )
+
+
 @mpl.rc_context(_STYLE)
-def scalability(metrics: Metrics, timing: Metrics, limit: int) -> Figure:
-    """Tree size and time against the smallest number of actions, ours and the paper's.
+def headline(metrics: Metrics, timing: Metrics, limit: int) -> Figure:
+    """Tree size and time against K, one curve per planner, with the paper's points.
+
+    A point is the mean over all problems with the same smallest number of actions K.
 
     Args:
         metrics: by problem and planner, None where a planner met the limit of the tree size.
         timing: as ``metrics``.
         limit: of the tree size.
     """
-    figure, axes = _subplots(2, 2, PAGE, 4.9, sharex=True, sharey="row")
-    for column, stacking in enumerate((True, False)):
-        problems = [p for p in paper.PROBLEMS if p.stacking == stacking and p.name in metrics]
-        tree, time = axes[:, column]
-        names = ", ".join(problem.name for problem in problems)
-        tree.set_title(f"{'Stack boxes' if stacking else 'Place boxes side by side'} ({names})")
-        _against_k(tree, problems, metrics, "tree_size", limit)
-        _against_k(time, problems, timing, "time", None)
-        tree.axhline(limit, color="#999999", linewidth=0.8, linestyle=":")
-        time.set_xlabel(r"Smallest number of actions $K_{\mathrm{min}}$")
-        time.set_xticks(sorted({problem.k_min for problem in paper.PROBLEMS}))
-    axes[0][0].set_ylabel("Tree size (nodes)")
-    axes[1][0].set_ylabel("Time to a plan (s)")
-    handles: dict[str, Any] = {}
-    for axis in axes.flat:
-        axis.set_yscale("log")
-        handles = dict(zip(*reversed(axis.get_legend_handles_labels()), strict=True)) | handles
-    labels = [f"{name}{origin}" for name in PLANNERS.values() for origin in ("", " (paper)")]
-    shown = [label for label in labels if label in handles]
-    figure.legend([handles[label] for label in shown], shown, loc="outside lower center", ncols=4)
+    figure, axes = _subplots(1, 2, PAGE, 3.7)
+    problems = compared(metrics)
+    for axis, quantity in zip(axes[0], _quantities(metrics, timing)[:2], strict=True):
+        _against_k(axis, problems, quantity, spread=False)
+        axis.set_xlabel("Smallest number of actions $K$")
+        axis.set_ylabel(quantity.title)
+        _log_axes(axis, problems)
+    _limit(axes[0][0], problems, metrics, limit)
+    _planner_legend(figure, axes)
     return figure
 
 
+@mpl.rc_context(_STYLE)
+def scalability(metrics: Metrics, timing: Metrics, limit: int) -> Figure:
+    """Tree size and times against the smallest number of actions, by type of problem.
+
+    Args:
+        metrics: by problem and planner, None where a planner met the limit of the tree size.
+        timing: as ``metrics``.
+        limit: of the tree size.
+    """
+    panels: dict[str, list[Problem]] = {}
+    for problem in compared(metrics):
+        panels.setdefault(problem.target.split()[0], []).append(problem)
+    quantities = _quantities(metrics, timing)
+    figure, axes = _subplots(
+        3, len(panels), PAGE, 7.0, sharex="col", sharey="row", width_ratios=_widths(panels)
+    )
+    for row, quantity in zip(axes, quantities, strict=True):
+        for axis, problems in zip(row, panels.values(), strict=True):
+            _against_k(axis, problems, quantity)
+        row[0].set_ylabel(quantity.title)
+    for axis, problems in zip(axes[0], panels.values(), strict=True):
+        names = ", ".join(problem.name for problem in problems)
+        kind = problems[0].target.split()[0]
+        axis.set_title(f"{_PANELS.get(kind, problems[0].target.capitalize())}\n({names})")
+        _limit(axis, problems, metrics, limit)
+    for axis, problems in zip(axes[-1], panels.values(), strict=True):
+        axis.set_xlabel("Smallest number of actions $K$")
+        axis.set_xticks(sorted({problem.k_min for problem in problems}))
+    for axis in axes.flat:
+        axis.set_yscale("log")
+    _planner_legend(figure, axes)
+    return figure
+
+
+_PANELS = {"stack": "Stack boxes", "place": "Place boxes side by side"}
+"""Titles of problems by the first word of their target; of others, the target itself."""
+
+
+def _widths(panels: Mapping[str, Sequence[Problem]]) -> list[int]:
+    return [len({problem.k_min for problem in problems}) for problems in panels.values()]
+
+
+def _log_axes(axis: Axes, problems: Sequence[Problem]) -> None:
+    axis.set_xscale("log")
+    axis.set_yscale("log")
+    lengths = sorted({problem.k_min for problem in problems})
+    axis.set_xticks(lengths, list(map(str, lengths)))
+    axis.minorticks_off()
+
+
 def _against_k(
-    axis: Axes,
-    problems: Sequence[paper.Problem],
-    metrics: Metrics,
-    quantity: str,
-    limit: int | None,
+    axis: Axes, problems: Sequence[Problem], quantity: Quantity, spread: bool = True
 ) -> None:
-    mean, std = QUANTITIES[quantity]
+    """Draw a quantity of all planners; without ``spread`` on a log axis of K, without bars."""
     for rank, (planner, name) in enumerate(PLANNERS.items()):
-        style: dict[str, Any] = {
-            "color": PLANNER_COLORS[planner],
-            "marker": PLANNER_MARKERS[planner],
-        }
+        style: dict[str, Any] = PLANNER_STYLES[planner]
         # Side by side, so that equal figures do not hide each other.
-        shift = 0.07 * (rank - (len(PLANNERS) - 1) / 2)
-        cells = [(p.k_min + shift, metrics[p.name].get(planner)) for p in problems]
-        known = [(k, cell) for k, cell in cells if cell and cell[mean] is not None]
+        side = rank - (len(PLANNERS) - 1) / 2
+        known: dict[int, list[Mapping[str, Any]]] = {}
+        for problem in problems:
+            cell = quantity.source[problem.name].get(planner)
+            if cell and cell[quantity.mean] is not None:
+                known.setdefault(problem.k_min, []).append(cell)
+        places = {k: k * (1 + 0.006 * side) for k in known}
         if known:
-            lengths = [k for k, _ in known]
-            values = np.array([cell[mean] for _, cell in known])
-            errors = np.array([cell[std] for _, cell in known])
+            lengths = [places[k] for k in known]
+            values = np.array(
+                [np.mean([c[quantity.mean] for c in cells]) for cells in known.values()]
+            )
+            errors = np.array(
+                [np.mean([c[quantity.std] for c in cells]) for cells in known.values()]
+            )
             # On a log axis an error bar cannot reach zero.
-            lower = np.minimum(errors, 0.9 * values)
-            axis.errorbar(
-                lengths, values, (lower, errors), elinewidth=0.7, capsize=1.5, label=name, **style
-            )
-        stopped = [k for k, cell in cells if cell and cell[mean] is None]
-        # Guided search ends with its attempts, not at the limit.
-        if limit is not None and stopped and planner != "guided":
-            axis.plot(
-                stopped,
-                [limit] * len(stopped),
-                "x",
-                color=style["color"],
-                markersize=6,
-                zorder=3,
-                label=None if known else name,
-            )
+            bars = (np.minimum(errors, 0.9 * values), errors) if spread else None
+            axis.errorbar(lengths, values, bars, elinewidth=0.7, capsize=1.5, label=name, **style)
         printed = [
-            (p.k_min + shift, paper.SCALABILITY[p.name][planner][mean])
+            (p.k_min * (1 + 0.006 * side), paper.SCALABILITY[p.name][planner][quantity.mean])
             for p in problems
-            if planner in paper.SCALABILITY[p.name]
+            if quantity.printed and planner in paper.SCALABILITY.get(p.name, {})
         ]
         if printed:
             axis.plot(
                 *zip(*printed, strict=True),
+                marker=style["marker"],
+                color=style["color"],
                 markerfacecolor="none",
-                markersize=7.5,
-                markeredgewidth=0.8,
-                linestyle="--",
-                linewidth=0.8,
+                markersize=8,
+                markeredgewidth=0.9,
+                linestyle="none",
                 label=f"{name} (paper)",
                 zorder=1.5,
-                **style,
             )
+
+
+def _limit(axis: Axes, problems: Sequence[Problem], metrics: Metrics, limit: int) -> None:
+    """Mark the limit of the tree size, and which planners without a policy met it where."""
+    axis.axhline(limit, color="#999999", linewidth=0.8, linestyle=":")
+    for planner in RIVALS:
+        cells = [(p.k_min, metrics[p.name].get(planner)) for p in problems]
+        stopped = sorted({k for k, cell in cells if cell and cell["tree_size_mean"] is None})
+        axis.plot(
+            stopped,
+            [limit] * len(stopped),
+            "x",
+            color=PLANNER_STYLES[planner]["color"],
+            markersize=6,
+        )
+
+
+def _planner_legend(figure: Figure, axes: np.ndarray) -> None:
+    handles: dict[str, Any] = {}
+    for axis in axes.flat:
+        handles = dict(zip(*reversed(axis.get_legend_handles_labels()), strict=True)) | handles
+    labels = [f"{name}{origin}" for name in PLANNERS.values() for origin in ("", " (paper)")]
+    shown = [label for label in labels if label in handles]
+    figure.legend([handles[label] for label in shown], shown, loc="outside lower center", ncols=4)
 
 
 @mpl.rc_context(_STYLE)
@@ -170,11 +252,23 @@ def success(problems: pd.DataFrame) -> Figure:
             that is not satisfied at the start.
     """
     planners = [name for name in VARIANTS if name in set(problems["planner"])]
+    policies = list(dict.fromkeys(VARIANTS[name].policy for name in planners))
+    searches = list(dict.fromkeys(VARIANTS[name].search for name in planners))
     kinds = sorted(set(problems["kind"]), key=lambda kind: (kind.count("+"), kind))
     figure, axes = _subplots(
-        1, len(planners), PAGE, 0.6 + 0.24 * len(kinds), sharey=True, sharex=True
+        len(policies),
+        len(searches),
+        PAGE,
+        0.6 + len(policies) * (0.3 + 0.16 * len(kinds)),
+        sharey=True,
+        sharex=True,
     )
-    for axis, planner in zip(axes[0], planners, strict=True):
+    for axis in axes.flat:
+        axis.set_visible(False)
+    for planner in planners:
+        variant = VARIANTS[planner]
+        axis = axes[policies.index(variant.policy)][searches.index(variant.search)]
+        axis.set_visible(True)
         rows = problems[problems["planner"] == planner]
         shares = pd.crosstab(rows["kind"], rows["outcome"], normalize="index")
         counts = rows["kind"].value_counts()
@@ -190,53 +284,81 @@ def success(problems: pd.DataFrame) -> Figure:
                 height=0.72,
             )
             left += column.to_numpy()
-        axis.set_title(VARIANTS[planner])
-        axis.set_xlabel("Problems (%)")
+        axis.set_title(f"{POLICIES[variant.policy]}:\n{variant.search}")
+        axis.set_yticks(
+            range(len(kinds)), [f"{kind} (n = {counts.get(kind, 0)})" for kind in kinds]
+        )
+        first = next(name for name in planners if VARIANTS[name].policy == variant.policy)
+        axis.tick_params(labelbottom=True, labelleft=planner == first)
         axis.set_xlim(0, 100)
         axis.grid(axis="y", visible=False)
-    axes[0][0].set_yticks(
-        range(len(kinds)), [f"{kind} (n = {counts.get(kind, 0)})" for kind in kinds]
-    )
     axes[0][0].invert_yaxis()
-    figure.legend(*axes[0][0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    for axis in axes[-1]:
+        axis.set_xlabel("Problems (%)")
+    handles = axes[0][0].get_legend_handles_labels()
+    figure.legend(*handles, loc="outside lower center", ncols=3)
     return figure
 
 
 @mpl.rc_context(_STYLE)
-def learning_curves(curves: Mapping[str, Mapping[str, Sequence[float]]]) -> Figure:
+def learning_curves(curves: Mapping[str, Mapping[str, Mapping[str, Sequence[float]]]]) -> Figure:
     """Loss and accuracy by epoch of every sub-policy.
 
     Args:
-        curves: by name of the sub-policy; training_loss, validation_loss, training_accuracy and
-            validation_accuracy, one value per epoch.
+        curves: by name of the sub-policy and policy; training_loss, validation_loss,
+            training_accuracy and validation_accuracy, one value per epoch.
     """
-    figure, axes = _subplots(2, len(curves), PAGE, 3.2, sharex=True, sharey="row")
-    for column, (title, values) in zip(axes.T, curves.items(), strict=True):
+    figure, axes = _subplots(2, len(curves), PAGE, 3.3, sharex="col", sharey="row")
+    for column, (title, policies) in zip(axes.T, curves.items(), strict=True):
         for axis, quantity, scale in zip(column, ("loss", "accuracy"), (1, 100), strict=True):
-            for split, color in (("training", "#AAAAAA"), ("validation", "#0072B2")):
-                heights = scale * np.array(values[f"{split}_{quantity}"])
-                axis.plot(range(1, len(heights) + 1), heights, color=color, label=split)
-        column[0].set_title(title)
+            for policy, values in policies.items():
+                for split, style in _SPLITS.items():
+                    heights = scale * np.array(values[f"{split}_{quantity}"])
+                    axis.plot(
+                        range(1, len(heights) + 1),
+                        heights,
+                        color=POLICY_COLORS[policy],
+                        label=f"{POLICIES[policy]}, {split}",
+                        **style,
+                    )
+        column[0].set_title(title.replace(": ", ":\n"))
         column[1].set_xlabel("Epoch")
     axes[0][0].set_ylabel("Loss (nats)")
     axes[1][0].set_ylabel("Accuracy (%)")
-    figure.legend(*axes[0][0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
+    handles: dict[str, Any] = {}
+    for axis in axes.flat:
+        handles |= dict(zip(*reversed(axis.get_legend_handles_labels()), strict=True))
+    figure.legend(handles.values(), handles, loc="outside lower center", ncols=3)
     return figure
 
 
+_SPLITS: dict[str, dict[str, Any]] = {
+    "training": {"linewidth": 0.8, "alpha": 0.45},
+    "validation": {"linewidth": 1.2},
+}
+
+
 @mpl.rc_context(_STYLE)
-def confusion(matrices: Mapping[str, tuple[Sequence[str], np.ndarray]]) -> Figure:
-    """Confusion of every sub-policy: rows the action of the data, columns the one predicted."""
-    sizes = [len(labels) for labels, _ in matrices.values()]
-    figure, axes = _subplots(1, len(matrices), PAGE, 2.1, width_ratios=[s + 0.5 for s in sizes])
-    for axis, (title, (labels, counts)) in zip(axes[0], matrices.items(), strict=True):
-        total = np.maximum(counts.sum(axis=1, keepdims=True), 1)
-        shares = counts / total
-        _heat(axis, shares, labels, labels, [[f"{100 * s:.0f}" for s in row] for row in shares])
-        axis.set_title(f"{title}\n(n = {int(counts.sum()):,})", fontsize=8)
-        axis.tick_params(labelsize=6.5, pad=1.5)
-        axis.set_xlabel("predicted", fontsize=8)
-    axes[0][0].set_ylabel("in the data")
+def confusion(matrices: Mapping[str, Mapping[str, tuple[Sequence[str], np.ndarray]]]) -> Figure:
+    """Confusion of every sub-policy: rows the action of the data, columns the one predicted.
+
+    Args:
+        matrices: by policy and name of the sub-policy, labels and counts; the same sub-policies
+            for every policy.
+    """
+    sizes = [len(labels) for labels, _ in next(iter(matrices.values())).values()]
+    figure, axes = _subplots(
+        len(matrices), len(sizes), PAGE, 2.1 * len(matrices), width_ratios=[s + 0.5 for s in sizes]
+    )
+    for row, (policy, chains) in zip(axes, matrices.items(), strict=True):
+        for axis, (title, (labels, counts)) in zip(row, chains.items(), strict=True):
+            total = np.maximum(counts.sum(axis=1, keepdims=True), 1)
+            shares = counts / total
+            _heat(axis, shares, labels, labels, [[f"{100 * s:.0f}" for s in row] for row in shares])
+            axis.set_title(f"{title}\n(n = {int(counts.sum()):,})", fontsize=8)
+            axis.tick_params(labelsize=6.5, pad=1.5)
+            axis.set_xlabel("predicted", fontsize=8)
+        row[0].set_ylabel(f"{POLICIES[policy]}\nin the data")
     return figure
 
 

@@ -10,11 +10,10 @@ import pandas as pd
 from guided_lgp.documents import read_json
 from guided_lgp.errors import InputError
 from guided_lgp.experiments.files import read_table
+from guided_lgp.experiments.problems import PROBLEMS, Problem
 from guided_lgp.paths import EVALUATION, METRICS, SCENES, SEQUENCES, TRAINING
-from guided_lgp.report.style import NETWORKS
+from guided_lgp.report.style import NETWORKS, POLICIES, VARIANTS
 from guided_lgp.scene import GeneratedScenes, load_scenes
-
-SCENE_SETS = ("training", "test", *(f"scalability_{setup}" for setup in "abcd"))
 
 Metrics = Mapping[str, Any]
 
@@ -26,8 +25,14 @@ _VERDICTS = (
     "failure_action",
     "failure_constraint",
 )
-_PROBLEMS = ("configuration", "objective", "unseen", "planner", "outcome")
-_RUNS = ("problem", "configuration", "objective", "planner", "solved", "reason", "skeleton")
+_OUTCOMES = (
+    *("configuration", "objective", "unseen", "planner"),
+    *("outcome", "length", "policy_calls"),
+)
+_RUNS = (
+    *("problem", "configuration", "objective", "planner"),
+    *("solved", "reason", "skeleton", "policy_calls"),
+)
 _MEANS = (
     "tree_size_mean",
     "tree_size_std",
@@ -39,6 +44,12 @@ _MEANS = (
     "coarse_s",
     "path_s",
 )
+_TRAINING = {
+    "paper": {name: (f"{name}.json", f"train_policy@{name}") for name in NETWORKS},
+    "improved": {name: (f"improved/{name}.json", f"train_improved@{name}") for name in NETWORKS},
+    "relational": {"relational": ("relational.json", "train_relational")},
+}
+"""By policy and network: the report of its training, and the stage that writes it."""
 
 
 @dataclass(frozen=True)
@@ -51,8 +62,8 @@ class Inputs:
     on any of the problems, since a mean over the others would understate it."""
     timing: Metrics
     """As ``scalability``."""
-    training: Metrics
-    """By network, the report of its training."""
+    training: Mapping[str, Mapping[str, Metrics]]
+    """By policy and network, the report of its training."""
     geometry: Metrics | None
     """Written by ``make bench``, which is not part of the pipeline."""
     scenes: Mapping[str, GeneratedScenes]
@@ -62,6 +73,11 @@ class Inputs:
     """One row per problem and planner of the test of generalization."""
     runs: pd.DataFrame
     """One row per problem, configuration, objective and planner of the test of scalability."""
+
+    @property
+    def setups(self) -> list[str]:
+        """The setups of the test of scalability."""
+        return _setups(self.scalability)
 
 
 def load_inputs(root: Path) -> Inputs:
@@ -81,24 +97,47 @@ def load_inputs(root: Path) -> Inputs:
         )
         for split in ("training", "test")
     ]
-    runs = _frame(root / EVALUATION / "scalability.parquet", "compare_scalability", _RUNS)
+    generalization = read_object(metrics / "generalization.json", "evaluate_generalization")
+    evaluated = {variant.policy for name, variant in VARIANTS.items() if name in generalization}
     stage = "compare_scalability"
+    runs = _frame(root / EVALUATION / "scalability.parquet", stage, _RUNS)
+    scalability = mask_stopped(read_object(metrics / "scalability.json", stage), runs)
     return Inputs(
-        generalization=read_object(metrics / "generalization.json", "evaluate_generalization"),
-        scalability=mask_stopped(read_object(metrics / "scalability.json", stage), runs),
+        generalization=generalization,
+        scalability=scalability,
         timing=mask_stopped(read_object(metrics / "scalability_timing.json", stage), runs),
         training={
-            network: read_object(root / TRAINING / f"{network}.json", f"train_policy@{network}")
-            for network in NETWORKS
+            policy: {
+                network: read_object(root / TRAINING / file, stage)
+                for network, (file, stage) in _TRAINING[policy].items()
+            }
+            for policy in POLICIES
+            if policy in evaluated
         },
         geometry=read_object(geometry, "make bench") if geometry.exists() else None,
-        scenes={name: load_scenes(root / SCENES / f"{name}.json") for name in SCENE_SETS},
+        scenes={
+            name: load_scenes(root / SCENES / f"{name}.json")
+            for name in (
+                "training",
+                "test",
+                *(f"scalability_{setup}" for setup in _setups(scalability)),
+            )
+        },
         verdicts=pd.concat(verdicts, ignore_index=True),
         problems=_frame(
-            root / EVALUATION / "generalization.parquet", "evaluate_generalization", _PROBLEMS
+            root / EVALUATION / "generalization.parquet", "evaluate_generalization", _OUTCOMES
         ),
         runs=runs,
     )
+
+
+def compared(scalability: Metrics) -> list[Problem]:
+    """The problems of the metrics, in the order of Table II, family e last."""
+    return [problem for problem in PROBLEMS if problem.name in scalability]
+
+
+def _setups(scalability: Metrics) -> list[str]:
+    return list(dict.fromkeys(problem.setup for problem in compared(scalability)))
 
 
 def mask_stopped(metrics: Metrics, runs: pd.DataFrame) -> Metrics:

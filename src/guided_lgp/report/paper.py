@@ -12,30 +12,20 @@ class Problem:
     objectives: int
     k_min: int
     """Smallest number of high-level actions that solves it."""
-    stacking: bool
-    """Whether the boxes end in a tower, rather than side by side."""
     reduced: bool = False
     """Whether breadth-first is granted a reduced branching factor (starred in the paper)."""
 
-    @property
-    def label(self) -> str:
-        """The name, starred as in the paper."""
-        return f"{self.name}*" if self.reduced else self.name
-
 
 PROBLEMS = (
-    Problem("a.1", "Stack boxes on table", 9, 4, stacking=True),
-    Problem("b.1", "Place boxes on tray/tab2", 8, 6, stacking=False, reduced=True),
-    Problem("b.2", "Stack boxes on tray", 6, 6, stacking=True),
-    Problem("c.1", "Place boxes on tray/tab2", 6, 8, stacking=False, reduced=True),
-    Problem("c.2", "Stack boxes on tray", 6, 8, stacking=True),
-    Problem("d.1", "Place boxes on tray/other table", 6, 10, stacking=False, reduced=True),
-    Problem("d.2", "Stack boxes on tray", 6, 10, stacking=True),
+    Problem("a.1", "Stack boxes on table", 9, 4),
+    Problem("b.1", "Place boxes on tray/tab2", 8, 6, reduced=True),
+    Problem("b.2", "Stack boxes on tray", 6, 6),
+    Problem("c.1", "Place boxes on tray/tab2", 6, 8, reduced=True),
+    Problem("c.2", "Stack boxes on tray", 6, 8),
+    Problem("d.1", "Place boxes on tray/other table", 6, 10, reduced=True),
+    Problem("d.2", "Stack boxes on tray", 6, 10),
 )
 """Table II."""
-
-TREE_LIMIT = 400_000
-"""Nodes at which the paper stopped the symbolic planner (Sec. III-B)."""
 
 GENERALIZATION: dict[str, dict[str, dict[str, float]]] = {
     "default": {

@@ -2,10 +2,11 @@
 
 import logging
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 from matplotlib.figure import Figure
 
 from guided_lgp.documents import write_json
@@ -13,15 +14,19 @@ from guided_lgp.logic import parse_skeleton
 from guided_lgp.nlp.bounds import SceneBounds
 from guided_lgp.params import BoundsParams, Params
 from guided_lgp.paths import METRICS, REPORTS
+from guided_lgp.policy.split import training_objectives
 from guided_lgp.report import analysis, figures, tables
-from guided_lgp.report.contents import compose
-from guided_lgp.report.inputs import Inputs, Metrics, load_inputs
+from guided_lgp.report.contents import Calls, compose
+from guided_lgp.report.inputs import Inputs, Metrics, compared, load_inputs
 from guided_lgp.report.pictures import draw_scene
 from guided_lgp.report.replay import replay_html
-from guided_lgp.report.style import NETWORKS, PLANNERS
+from guided_lgp.report.style import GUIDED, PLANNERS, RIVALS
 from guided_lgp.report.table import Table
 
-SETUPS = "abcd"
+REPLAYED = ("a", "b", "c", "d", "e10")
+"""Setups of which one plan is replayed; a page of about 1 MB each."""
+_SHOWN = (*GUIDED, *RIVALS)
+"""Whose plan is replayed, if it has one."""
 
 logger = logging.getLogger(__name__)
 
@@ -38,12 +43,14 @@ def run(params: Params, root: Path) -> None:
     """
     inputs = load_inputs(root)
     reports = root / REPORTS
-    for folder in ("tables", "figures", "replays"):
+    for folder in ("curves", "tables", "figures", "replays"):
         shutil.rmtree(reports / folder, ignore_errors=True)
         (reports / folder).mkdir(parents=True)
-    training = tables.training_metrics(inputs.training)
-    write_json(root / METRICS / "training.json", training)
-    written = {table.name: table for table in _tables(inputs, training)}
+    write_json(root / METRICS / "training.json", tables.training_metrics(inputs.training))
+    _write_curves(inputs, reports / "curves")
+    novelty = _novelty(inputs, params)
+    calls = Calls(analysis.calls_per_action(inputs.problems), analysis.policy_calls(inputs.runs))
+    written = {table.name: table for table in _tables(inputs, novelty, calls)}
     for table in written.values():
         for suffix, text in (
             ("md", table.markdown()),
@@ -53,80 +60,102 @@ def run(params: Params, root: Path) -> None:
             (reports / "tables" / f"{table.name}.{suffix}").write_text(text, encoding="utf-8")
     for name, figure in _figures(inputs, params).items():
         figures.save(figure, reports / "figures", name)
-    scenes = {setup: inputs.scenes[f"scalability_{setup}"].scenes[0] for setup in SETUPS}
-    for setup, scene in scenes.items():
+    for setup in inputs.setups:
+        scene = inputs.scenes[f"scalability_{setup}"].scenes[0]
         draw_scene(scene, reports / "figures" / f"setup_{setup}.png")
     replays = _replays(inputs, params.bounds, reports)
-    document = compose(inputs, params, written, SETUPS, replays)
+    studies = "studies/studies.md" if (reports / "studies/studies.md").is_file() else None
+    document = compose(inputs, params, novelty, calls, written, replays, studies)
     (reports / "report.md").write_text(document.markdown(), encoding="utf-8")
     (reports / "report.html").write_text(document.html(reports), encoding="utf-8")
     logger.info("report: %s", reports / "report.html")
 
 
-def _tables(inputs: Inputs, training: Metrics) -> list[Table]:
+def _novelty(inputs: Inputs, params: Params) -> Mapping[str, str]:
+    """How new every objective of setup a is."""
+    draw = params.build_dataset
+    symbols = inputs.scenes["test"].scenes[0].symbols
+    chosen = training_objectives(symbols, draw.training_objectives, draw.seed)
+    return analysis.novelty(symbols, chosen)
+
+
+def _tables(inputs: Inputs, novelty: Mapping[str, str], calls: Calls) -> list[Table]:
     rejected = {name: (len(s.scenes), s.rejected) for name, s in inputs.scenes.items()}
     optional = [tables.geometry(inputs.geometry)] if inputs.geometry is not None else []
     return [
-        tables.generalization(inputs.generalization),
-        *tables.scalability(inputs.scalability, inputs.timing),
-        tables.training(training),
+        tables.generalization(inputs.generalization, calls.per_action),
+        tables.unseen(analysis.by_novelty(inputs.problems, novelty), novelty),
+        *tables.scalability(inputs.scalability, inputs.timing, calls.by_problem),
+        tables.training(inputs.training),
         tables.enumeration(analysis.by_length(inputs.verdicts), rejected),
         *optional,
     ]
+
+
+def _sub_policies(inputs: Inputs) -> Iterator[tuple[str, str, Metrics]]:
+    """Policy, name and report of every sub-policy."""
+    for policy, networks in inputs.training.items():
+        for network, report in networks.items():
+            for name, trained in report["sub_policies"].items():
+                yield policy, network if network == name else f"{network}: {name}", trained
+
+
+def _write_curves(inputs: Inputs, folder: Path) -> None:
+    """One CSV file per sub-policy, a row per epoch, which ``dvc plots`` draws."""
+    for policy, name, report in _sub_policies(inputs):
+        file = "_".join((policy, *name.split(": "))) + ".csv"
+        curves = pd.DataFrame(report["curves"])
+        curves.insert(0, "epoch", range(1, len(curves) + 1))
+        curves.to_csv(folder / file, index=False)
 
 
 def _figures(inputs: Inputs, params: Params) -> Mapping[str, Figure]:
     scenes = {
         scene.name: scene for name in ("training", "test") for scene in inputs.scenes[name].scenes
     }
-    sub_policies = {
-        network if network == name else f"{network}: {name}": figures
-        for network in NETWORKS
-        for name, figures in inputs.training[network]["sub_policies"].items()
-    }
+    curves: dict[str, dict[str, Metrics]] = {}
+    matrices: dict[str, dict[str, tuple[list[str], np.ndarray]]] = {}
+    for policy, name, report in _sub_policies(inputs):
+        curves.setdefault(name, {})[policy] = report["curves"]
+        if "confusion" in report:
+            counts = report["classes"], np.array(report["confusion"])
+            matrices.setdefault(policy, {})[name] = counts
+    limit = params.compare_scalability.max_tree_size
     return {
+        "headline": figures.headline(inputs.scalability, inputs.timing, limit),
+        "scalability": figures.scalability(inputs.scalability, inputs.timing, limit),
         "success": figures.success(analysis.outcomes(inputs.problems, scenes)),
-        "scalability": figures.scalability(
-            inputs.scalability, inputs.timing, params.compare_scalability.max_tree_size
-        ),
-        "learning_curves": figures.learning_curves(
-            {name: report["curves"] for name, report in sub_policies.items()}
-        ),
-        "confusion": figures.confusion(
-            {
-                name: (report["classes"], np.array(report["confusion"]))
-                for name, report in sub_policies.items()
-            }
-        ),
+        "learning_curves": figures.learning_curves(curves),
+        "confusion": figures.confusion(matrices),
         "feasible_share": figures.feasible_share(analysis.by_last_action(inputs.verdicts, scenes)),
         "failures": figures.failures(analysis.failures(inputs.verdicts, scenes)),
     }
 
 
 def _replays(inputs: Inputs, bounds: BoundsParams, reports: Path) -> list[tuple[str, str]]:
-    """Write a replay of one plan per setup: guided search's last, or else another planner's.
+    """Write a replay of one plan per setup, by the first planner of :data:`_SHOWN` that has one.
 
     Returns:
         Address relative to the report and description of each.
     """
     written = []
     solved = inputs.runs[inputs.runs["solved"].astype(bool)]
-    solved = solved.sort_values("planner", key=lambda names: names == "guided", kind="stable")
-    for setup in SETUPS:
-        plans = solved[solved["problem"].str.startswith(setup)]
-        if plans.empty:
+    for setup in REPLAYED:
+        names = [problem.name for problem in compared(inputs.scalability) if problem.setup == setup]
+        if not names:
             continue
-        problem, configuration, objective, planner, skeleton = plans.iloc[-1][
-            ["problem", "configuration", "objective", "planner", "skeleton"]
-        ]
-        scenes = inputs.scenes[f"scalability_{setup}"].scenes
-        scene = next(scene for scene in scenes if scene.name == configuration)
-        # The evaluation keeps sequences, not motions; a bound gives the same motion again.
-        actions = parse_skeleton(skeleton)
-        trajectory = SceneBounds(scene, bounds).path(actions).trajectory
-        if trajectory is not None:
-            address = f"replays/{setup}.html"
-            replay_html(trajectory, scene, reports / address)
-            plan = f"{len(actions)} actions by {PLANNERS[planner]}"
-            written.append((address, f"Problem {problem}: {objective}, {plan}"))
+        scenes = {scene.name: scene for scene in inputs.scenes[f"scalability_{setup}"].scenes}
+        plans = solved[solved["problem"].isin(names)].sort_values(
+            "planner", key=lambda planners: planners.map(_SHOWN.index), kind="stable"
+        )
+        for plan in plans.itertuples():
+            # The evaluation keeps sequences, not motions; a bound gives the same motion again.
+            scene, actions = scenes[str(plan.configuration)], parse_skeleton(str(plan.skeleton))
+            trajectory = SceneBounds(scene, bounds).path(actions).trajectory
+            if trajectory is not None:
+                address = f"replays/{setup}.html"
+                replay_html(trajectory, scene, reports / address)
+                text = f"{plan.objective}: {len(actions)} actions, {PLANNERS[str(plan.planner)]}"
+                written.append((address, f"Problem {plan.problem}, {text}"))
+                break
     return written

@@ -1,41 +1,75 @@
 """Names and colours that tables, figures and pages share."""
 
+from dataclasses import dataclass
+
+POLICIES = {
+    "paper": "Paper's networks",
+    "improved": "Improved networks",
+    "relational": "Relational policy",
+}
+"""The trained policies, in the order of every table."""
+
 PLANNERS = {
     "breadth_first": "Breadth-first",
-    "guided": "Guided",
-    "guided_best_first": "Guided best-first",
-    "relational": "Relational",
     "breadth_first_graph": "Graph breadth-first",
     "astar": "A*",
+    "guided": "Guided",
+    "guided_best_first": "Guided best-first",
+    "improved": "Improved",
+    "improved_best_first": "Improved best-first",
+    "relational": "Relational",
+    "relational_best_first": "Relational best-first",
 }
 """Planners of the comparison of scalability, in the order of every table and legend."""
 
-PLANNER_COLORS = {
-    "breadth_first": "#555555",
-    "guided": "#0072B2",
-    "guided_best_first": "#009E73",
-    "relational": "#CC79A7",
-    "breadth_first_graph": "#E69F00",
-    "astar": "#D55E00",
-}
+RIVALS = ("breadth_first", "breadth_first_graph", "astar")
+"""Planners without a policy."""
+
+GUIDED = tuple(name for name in PLANNERS if name not in RIVALS)
+"""Planners with one."""
+
+POLICY_COLORS = {"paper": "#0072B2", "improved": "#009E73", "relational": "#CC79A7"}
 """Colours that readers with colour-blindness can tell apart (Okabe and Ito)."""
 
-PLANNER_MARKERS = {
-    "breadth_first": "s",
-    "guided": "o",
-    "guided_best_first": "D",
-    "relational": "v",
-    "breadth_first_graph": "^",
-    "astar": "P",
+_GREEDY, _BEST_FIRST = {"marker": "o", "linestyle": "--"}, {"marker": "D"}
+PLANNER_STYLES = {
+    "breadth_first": {"color": "#333333", "marker": "s"},
+    "breadth_first_graph": {"color": "#E69F00", "marker": "^"},
+    "astar": {"color": "#D55E00", "marker": "P"},
+    "guided": {"color": POLICY_COLORS["paper"], **_GREEDY},
+    "guided_best_first": {"color": POLICY_COLORS["paper"], **_BEST_FIRST},
+    "improved": {"color": POLICY_COLORS["improved"], **_GREEDY},
+    "improved_best_first": {"color": POLICY_COLORS["improved"], **_BEST_FIRST},
+    "relational": {"color": POLICY_COLORS["relational"], **_GREEDY},
+    "relational_best_first": {"color": POLICY_COLORS["relational"], **_BEST_FIRST},
 }
+"""A colour per policy, dashed where the search is greedy."""
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A planner of the test of generalization."""
+
+    policy: str
+    search: str
+
+    @property
+    def label(self) -> str:
+        """Policy and search."""
+        return f"{POLICIES[self.policy]}, {self.search}"
+
 
 VARIANTS = {
-    "default": "Default",
-    "adaptation": "Objective adaptation",
-    "best_first": "Best-first + adaptation",
-    "relational": "Relational",
+    "default": Variant("paper", "default"),
+    "adaptation": Variant("paper", "objective adaptation"),
+    "best_first": Variant("paper", "best-first"),
+    "improved_default": Variant("improved", "default"),
+    "improved_adaptation": Variant("improved", "objective adaptation"),
+    "improved_best_first": Variant("improved", "best-first"),
+    "relational": Variant("relational", "objective adaptation"),
+    "relational_best_first": Variant("relational", "best-first"),
 }
 """Planners of the test of generalization, in the order of Table I."""
 
 NETWORKS = {"instruction": "μ_ins", "grasp": "μ_grasp", "place": "μ_place"}
-"""The three networks of the hierarchical policy."""
+"""The three networks of the paper's hierarchical policy."""

@@ -1,27 +1,30 @@
 """The tables of the report, each beside the paper's figures where the paper has any."""
 
 import math
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+import pandas as pd
+
+from guided_lgp.experiments.problems import Problem
 from guided_lgp.report import paper
-from guided_lgp.report.inputs import Metrics
-from guided_lgp.report.style import NETWORKS, PLANNERS, VARIANTS
+from guided_lgp.report.analysis import NEW, RENAMED, SEEN
+from guided_lgp.report.inputs import Metrics, compared
+from guided_lgp.report.style import NETWORKS, PLANNERS, POLICIES, VARIANTS
 from guided_lgp.report.table import Table
 
 NONE = "–"
 """Stands where there is no figure."""
 
-_ROWS = {
+_SHARES = {
     "shortest": "Shortest solution",
     "feasible": "Feasible solution",
     "no_solution": "No solution",
-    "reattempt_infeasible": "Reattempts: infeasible solution",
-    "reattempt_max_depth": "Reattempts: maximum depth",
-    "unsolvable": "No feasible sequence exists",
-    "shortest_without_path": "No shortest sequence has a path",
+    "reattempt_infeasible": "Reattempts: infeasible",
+    "reattempt_max_depth": "Reattempts: depth",
 }
-_SETS = {"all": "all", "unseen": "unseen"}
+_SUBSETS = ("all", "unseen")
 
 
 def percent(fraction: float | None) -> str:
@@ -34,75 +37,125 @@ def number(value: float | None, decimals: int = 1) -> str:
     return NONE if value is None or math.isnan(value) else f"{value:,.{decimals}f}"
 
 
-def spread(mean: float | None, std: float | None, decimals: int = 1) -> str:
-    """Mean and standard deviation."""
+def spread(mean: float | None, std: float | None) -> str:
+    """Mean and standard deviation, both with as many decimals as fit the mean."""
     if mean is None or math.isnan(mean):
         return NONE
+    decimals = 2 if mean < 10 else 1 if mean < 1000 else 0
     return f"{number(mean, decimals)} ± {number(std, decimals)}"
 
 
-def generalization(metrics: Metrics) -> Table:
-    """Table I: shares of problems by outcome, paper and ours, all and unseen objectives."""
-    variants = [name for name in VARIANTS if name in metrics]
-    groups: list[tuple[str, int]] = [("", 1)]
-    columns = ["Share of problems"]
-    sources: list[tuple[str, str, str]] = []
-    for variant in variants:
-        origins = ("paper", "ours") if variant in paper.GENERALIZATION else ("ours",)
-        groups.append((VARIANTS[variant], 2 * len(origins)))
-        for subset in _SETS:
-            for origin in origins:
-                columns.append(f"{_SETS[subset]}, {origin}")
-                sources.append((variant, subset, origin))
+def generalization(metrics: Metrics, calls: Mapping[str, float]) -> Table:
+    """Table I: shares of problems by outcome, paper and ours, all and unseen objectives.
 
-    def cell(key: str, variant: str, subset: str, origin: str) -> Any:
-        figures = paper.GENERALIZATION if origin == "paper" else metrics
-        return figures[variant][subset].get(key)
-
-    rows = [
-        (label, *(percent(cell(key, *source)) for source in sources))
-        for key, label in _ROWS.items()
-    ]
-    rows.append(
-        (
-            "Problems n",
-            *(
-                str(
-                    paper.GENERALIZATION_N[subset] if origin == "paper" else metrics[v][subset]["n"]
+    Args:
+        metrics: by planner and set of objectives.
+        calls: by planner, mean number of policy calls per action of the plan.
+    """
+    rows, records = [], []
+    for name, variant in VARIANTS.items():
+        if name not in metrics:
+            continue
+        sources = {"ours": metrics[name]}
+        if name in paper.GENERALIZATION:
+            sources = {"paper": paper.GENERALIZATION[name], **sources}
+        for source, subsets in sources.items():
+            n = {
+                subset: paper.GENERALIZATION_N[subset]
+                if source == "paper"
+                else subsets[subset]["n"]
+                for subset in _SUBSETS
+            }
+            shown = calls.get(name) if source == "ours" else None
+            rows.append(
+                (
+                    POLICIES[variant.policy],
+                    variant.search,
+                    source,
+                    *(percent(subsets[subset][key]) for key in _SHARES for subset in _SUBSETS),
+                    number(shown, 2),
+                    *(str(n[subset]) for subset in _SUBSETS),
                 )
-                for v, subset, origin in sources
-            ),
-        )
-    )
-    records = [
-        {"planner": v, "objectives": s, "source": o}
-        | {key: cell(key, v, s, o) for key in _ROWS}
-        | {"n": paper.GENERALIZATION_N[s] if o == "paper" else metrics[v][s]["n"]}
-        for v, s, o in sources
-    ]
+            )
+            records += [
+                {"planner": name, "objectives": subset, "source": source, "n": n[subset]}
+                | {key: subsets[subset].get(key) for key in (*_SHARES, *_OF_PROBLEMS)}
+                for subset in _SUBSETS
+            ]
+    problems = next(iter(metrics.values()))["all"]
     return Table(
         "table_1",
         "Table I. Generalizability over all and unseen objectives",
-        tuple(columns),
+        ("Policy", "Search", "Source", *(_SUBSETS * len(_SHARES)), "per action", *_SUBSETS),
         tuple(rows),
         (
             "A shortest solution has the minimal number of actions that exhaustive enumeration "
-            "finds feasible. Ours are shares of the n problems that are not satisfied at the "
-            "start; the paper's n is its number of configurations times objectives. Reattempts: "
-            "problems with at least one for that cause. A problem counts as without a feasible "
-            "sequence if the enumeration found none up to its longest length.",
+            "finds feasible; a feasible one has more. Ours are shares of the n problems that are "
+            "not satisfied at the start; the paper's n is its number of configurations times "
+            "objectives. Reattempts: problems with at least one for that cause. Best-first search "
+            "adapts the objective, too. Policy calls: mean over the problems solved. "
+            f"In {percent(problems['unsolvable'])} of our problems the enumeration finds no "
+            f"feasible sequence, in {percent(problems['shortest_without_path'])} no shortest "
+            "sequence has a path.",
         ),
-        tuple(groups),
+        (("", 3), *((label, 2) for label in _SHARES.values()), ("Policy calls", 1), ("n", 2)),
+        labels=3,
         records=records,
     )
 
 
-def scalability(metrics: Metrics, timing: Metrics) -> list[Table]:
-    """Table III: tree size and time of every planner beside the paper's, then the details."""
+_OF_PROBLEMS = ("unsolvable", "shortest_without_path")
+"""Shares that are the same for every planner."""
+
+
+def unseen(shares: pd.DataFrame, novelty: Mapping[str, str]) -> Table:
+    """What "unseen" means where boxes are interchangeable.
+
+    Args:
+        shares: columns planner, kind, n and shortest (share); see :func:`analysis.by_novelty`.
+        novelty: of every objective.
+    """
+    counts = Counter(novelty.values())
+    kinds = [kind for kind in (SEEN, RENAMED, NEW) if counts[kind]]
+    cells = shares.set_index(["planner", "kind"])["shortest"]
+    planners = [name for name in VARIANTS if name in set(shares["planner"])]
+    return Table(
+        "unseen",
+        "Shortest solutions by how new the objective is",
+        ("Policy", "Search", *(f"{counts[kind]} objectives" for kind in kinds)),
+        tuple(
+            (
+                POLICIES[VARIANTS[name].policy],
+                VARIANTS[name].search,
+                *(percent(cells.get((name, kind))) for kind in kinds),
+            )
+            for name in planners
+        ),
+        (
+            "Seen: drawn for training. Renamed: unseen, but a training objective becomes it when "
+            "the boxes are renamed; a policy that treats all boxes alike has seen these. New: "
+            "unseen under every renaming of the boxes.",
+        ),
+        (("", 2), *((kind.capitalize(), 1) for kind in kinds)),
+        labels=2,
+        records=[dict(zip(shares.columns, row, strict=True)) for row in shares.to_numpy()],
+    )
+
+
+def scalability(
+    metrics: Metrics, timing: Metrics, calls: Mapping[tuple[str, str], float]
+) -> list[Table]:
+    """Table III: tree size and time of every planner beside the paper's, then the details.
+
+    Args:
+        metrics: by problem and planner.
+        timing: as ``metrics``.
+        calls: by problem and planner, mean number of policy calls.
+    """
     return [
         _comparison("tree_size", metrics, metrics),
         _comparison("time", metrics, timing),
-        _details(metrics, timing),
+        _details(metrics, timing, calls),
     ]
 
 
@@ -110,71 +163,79 @@ def _planners(metrics: Metrics) -> list[str]:
     return [name for name in PLANNERS if any(name in row for row in metrics.values())]
 
 
-def _problems(metrics: Metrics) -> list[paper.Problem]:
-    return [problem for problem in paper.PROBLEMS if problem.name in metrics]
+def label(problem: Problem) -> str:
+    """The problem's name, starred as in the paper."""
+    return f"{problem.name}*" if problem.reduced else problem.name
 
 
 _QUANTITIES = {
-    "tree_size": ("Table III. Tree size (nodes)", "tree_size_mean", "tree_size_std", 1),
-    "time": ("Table III. Time to the first plan (s)", "time_mean_s", "time_std_s", 2),
+    "tree_size": ("Table III. Tree size (nodes)", "tree_size_mean", "tree_size_std"),
+    "time": ("Table III. Time to the first plan (s)", "time_mean_s", "time_std_s"),
 }
 
 
 def _comparison(quantity: str, metrics: Metrics, figures: Metrics) -> Table:
-    title, mean, std, decimals = _QUANTITIES[quantity]
-    planners = _planners(metrics)
-    groups: list[tuple[str, int]] = [("", 2), ("n", 2)]
-    columns = ["Problem", "K_min", "paper", "ours"]
-    for planner in planners:
-        origins = ["paper", "ours"] if planner in paper.PLANNERS else ["ours"]
-        groups.append((PLANNERS[planner], len(origins)))
-        columns += origins
-    rows, records = [], []
-    for problem in _problems(metrics):
-        row = []
-        counts = {cell["problems"] for cell in metrics[problem.name].values()}
-        for planner in planners:
-            if planner in paper.PLANNERS:
-                printed = paper.SCALABILITY[problem.name].get(planner, {})
-                row.append(spread(printed.get(mean), printed.get(std), decimals))
-                records.append(
-                    _record(problem, planner, "paper", printed.get(mean), printed.get(std))
-                    | {"n": problem.objectives}
-                )
+    title, mean, std = _QUANTITIES[quantity]
+    problems = compared(metrics)
+    printed_n = {problem.name: str(problem.objectives) for problem in paper.PROBLEMS}
+    rows = [
+        ("Problems n", "paper", *(printed_n.get(problem.name, "") for problem in problems)),
+        ("Problems n", "ours", *(_count(metrics[problem.name]) for problem in problems)),
+    ]
+    records = []
+    for planner in _planners(metrics):
+        if planner in paper.PLANNERS:
+            cells = []
+            for problem in problems:
+                printed = paper.SCALABILITY.get(problem.name)
+                cell = (printed or {}).get(planner, {})
+                cells.append("" if printed is None else spread(cell.get(mean), cell.get(std)))
+                records.append(_record(problem, planner, "paper", cell.get(mean), cell.get(std)))
+            rows.append((PLANNERS[planner], "paper", *cells))
+        cells = []
+        for problem in problems:
             cell = metrics[problem.name].get(planner)
             if cell is None:
-                row.append("")
+                cells.append("")
                 continue
             shown = figures[problem.name][planner]
             solved, n = cell["problems_solved"], cell["problems"]
             partial = "" if solved == n else f" ({solved}/{n})"
-            row.append(spread(shown[mean], shown[std], decimals) + partial)
+            cells.append(spread(shown[mean], shown[std]) + partial)
             records.append(
                 _record(problem, planner, "ours", shown[mean], shown[std])
                 | {"n": n, "solved": solved}
             )
-        n = "/".join(map(str, sorted(counts)))
-        rows.append((problem.label, str(problem.k_min), str(problem.objectives), n, *row))
+        rows.append((PLANNERS[planner], "ours", *cells))
+    groups: dict[str, int] = {}
+    for problem in problems:
+        heading = f"K = {problem.k_min}"
+        groups[heading] = groups.get(heading, 0) + 1
     return Table(
         f"table_3_{quantity}",
         title,
-        tuple(columns),
+        ("Planner", "Source", *map(label, problems)),
         tuple(rows),
         (
-            "Mean ± standard deviation over the problems solved. n: problems given to each "
-            "planner, objectives × configurations (one in the paper). (k/n): k of n solved. "
-            f"{NONE}: stopped at the limit of the tree size on at least one problem, or none "
-            "solved. "
-            "*: reduced branching factor for breadth-first, as in the paper.",
+            "Mean ± standard deviation over the problems solved. K: smallest number of actions. "
+            "n: problems given to each planner, objectives × configurations (one in the paper). "
+            f"(k/n): k of n solved. {NONE}: stopped at the limit of the tree size on at least one "
+            "problem, or none solved. *: reduced branching factor for planners without a policy, "
+            "as for the paper's breadth-first. Graph breadth-first merges equal states. Guided: "
+            "the paper's networks.",
         ),
-        tuple(groups),
-        labels=1,
+        (("", 2), *groups.items()),
+        labels=2,
         records=records,
     )
 
 
+def _count(cells: Metrics) -> str:
+    return "/".join(map(str, sorted({cell["problems"] for cell in cells.values()})))
+
+
 def _record(
-    problem: paper.Problem, planner: str, source: str, mean: float | None, std: float | None
+    problem: Problem, planner: str, source: str, mean: float | None, std: float | None
 ) -> dict[str, object]:
     return {
         "problem": problem.name,
@@ -192,10 +253,10 @@ def search_time(times: Metrics) -> float | None:
     return None if None in parts else float(sum(parts))
 
 
-def _details(metrics: Metrics, timing: Metrics) -> Table:
+def _details(metrics: Metrics, timing: Metrics, calls: Mapping[tuple[str, str], float]) -> Table:
     rows, records = [], []
     parts = ("symbolic_s", "policy_s", "coarse_s", "path_s")
-    for problem in _problems(metrics):
+    for problem in compared(metrics):
         for planner in _planners(metrics):
             cell = metrics[problem.name].get(planner)
             if cell is None:
@@ -203,16 +264,18 @@ def _details(metrics: Metrics, timing: Metrics) -> Table:
             times = timing[problem.name][planner]
             rows.append(
                 (
-                    problem.label,
+                    label(problem),
                     PLANNERS[planner],
                     f"{cell['problems_solved']}/{cell['problems']}",
                     number(cell["plan_length_mean"]),
+                    number(calls.get((problem.name, planner))),
                     *(number(times[part], 3) for part in parts),
                     number(search_time(times), 3),
                     number(times["peak_rss_mb"], 0),
                 )
             )
-            records.append({"problem": problem.name, "planner": planner, **cell, **times})
+            made = {"policy_calls_mean": calls.get((problem.name, planner))}
+            records.append({"problem": problem.name, "planner": planner, **cell, **made, **times})
     return Table(
         "table_3_details",
         "Scalability in detail: plans, parts of the time, memory",
@@ -221,6 +284,7 @@ def _details(metrics: Metrics, timing: Metrics) -> Table:
             "Planner",
             "Solved",
             "Plan length",
+            "Policy calls",
             "Symbolic (s)",
             "Policy (s)",
             "Coarse (s)",
@@ -238,59 +302,71 @@ def _details(metrics: Metrics, timing: Metrics) -> Table:
     )
 
 
-def training_metrics(reports: Metrics) -> dict[str, dict[str, dict[str, object]]]:
+_FIT = ("accuracy", "loss", "epochs", "best_epoch")
+
+
+def training_metrics(reports: Mapping[str, Mapping[str, Metrics]]) -> dict[str, Any]:
     """Accuracy, loss (nats) and epochs by network and sub-policy, for both choices of validation.
 
+    The paper's networks stand at the top, those of other policies below the policy's name.
+
     Args:
-        reports: by network, what its training wrote.
+        reports: by policy and network, what its training wrote.
     """
-    keys = ("accuracy", "loss", "epochs", "best_epoch")
-    return {
-        network: {
-            name: {
-                **{key: figures[key] for key in keys},
-                "samples": report["samples"],
-                "by_configuration": {key: figures["by_configuration"][key] for key in keys},
-            }
-            for name, figures in report["sub_policies"].items()
+    figures = {
+        policy: {
+            network: {name: _fits(report, name) for name in report["sub_policies"]}
+            for network, report in networks.items()
         }
-        for network, report in reports.items()
+        for policy, networks in reports.items()
+    }
+    return {**figures.pop("paper", {}), **figures}
+
+
+def _fits(report: Metrics, name: str) -> dict[str, Any]:
+    figures = report["sub_policies"][name]
+    return {
+        **{key: figures[key] for key in _FIT},
+        "samples": report["samples"],
+        "by_configuration": {key: figures["by_configuration"][key] for key in _FIT},
     }
 
 
-def training(metrics: Metrics) -> Table:
+def training(reports: Mapping[str, Mapping[str, Metrics]]) -> Table:
     """Accuracy, loss and epochs of every sub-policy; see :func:`training_metrics`."""
     rows, records = [], []
-    for network, sub_policies in metrics.items():
-        for name, figures in sub_policies.items():
-            held_out = figures["by_configuration"]
-            rows.append(
-                (
-                    NETWORKS[network],
-                    name,
-                    f"{figures['samples']:,}",
-                    *(
-                        text
-                        for split in (figures, held_out)
-                        for text in (
-                            percent(split["accuracy"]),
-                            number(split["loss"], 3),
-                            f"{split['best_epoch']}/{split['epochs']}",
-                        )
-                    ),
+    for policy, networks in reports.items():
+        for network, report in networks.items():
+            for name in report["sub_policies"]:
+                fits = _fits(report, name)
+                splits = {"random": fits, "configuration": fits["by_configuration"]}
+                rows.append(
+                    (
+                        POLICIES[policy],
+                        NETWORKS.get(network, network),
+                        name,
+                        f"{fits['samples']:,}",
+                        *(
+                            text
+                            for split in splits.values()
+                            for text in (
+                                percent(split["accuracy"]),
+                                number(split["loss"], 3),
+                                f"{split['best_epoch']}/{split['epochs']}",
+                            )
+                        ),
+                    )
                 )
-            )
-            for validation, split in (("random", figures), ("configuration", held_out)):
-                values = {key: split[key] for key in ("accuracy", "loss", "epochs", "best_epoch")}
-                records.append(
-                    {"network": network, "sub_policy": name, "validation": validation}
-                    | values
-                    | {"samples": figures["samples"]}
-                )
+                records += [
+                    {"policy": policy, "network": network, "sub_policy": name}
+                    | {"validation": validation, "samples": fits["samples"]}
+                    | {key: split[key] for key in _FIT}
+                    for validation, split in splits.items()
+                ]
     return Table(
         "training",
-        "Training of the hierarchical policy",
-        ("Network", "Sub-policy", "Samples n", *(2 * ("Accuracy", "Loss", "Epoch"))),
+        "Training of the policies",
+        ("Policy", "Network", "Sub-policy", "Samples n", *(2 * ("Accuracy", "Loss", "Epoch"))),
         tuple(rows),
         (
             "Accuracy and loss (nats) on the validation samples at the best epoch, of the epochs "
@@ -299,8 +375,8 @@ def training(metrics: Metrics) -> Table:
             "out show what copies of a sample on both sides hide. Several actions are right in "
             "most states, which bounds both figures.",
         ),
-        (("", 3), ("Random samples (paper)", 3), ("Whole configurations", 3)),
-        labels=2,
+        (("", 4), ("Random samples (paper)", 3), ("Whole configurations", 3)),
+        labels=3,
         records=records,
     )
 
