@@ -35,6 +35,7 @@ STAGES = {
     "build_dataset": "guided_lgp.experiments.build_dataset",
     "train_policy": "guided_lgp.experiments.train_policy",
     "train_improved": "guided_lgp.experiments.train_improved",
+    "train_relational": "guided_lgp.experiments.train_relational",
     "evaluate_generalization": "guided_lgp.experiments.evaluate_generalization",
     "compare_scalability": "guided_lgp.experiments.compare_scalability",
     "render_reports": "guided_lgp.report.render",
@@ -270,6 +271,15 @@ def train_improved(
     Example: guided-lgp train_improved place
     """
     _run_stage("train_improved", params, network.value)
+
+
+@app.command("train_relational")
+def train_relational(params: ParamsFile = PARAMS) -> None:
+    """Train the relational policy. Writes models, reports/training.
+
+    Example: guided-lgp train_relational
+    """
+    _run_stage("train_relational", params)
 
 
 @app.command("evaluate_generalization")

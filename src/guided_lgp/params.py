@@ -117,6 +117,20 @@ class TrainPolicy(_Section):
     place: Network
 
 
+class TrainRelational(_Section):
+    """Training of the relational policy."""
+
+    seed: Seed
+    validation_share: Annotated[float, Field(gt=0, lt=1), _NUMBER]
+    patience: Count
+    width: Annotated[int, Field(strict=True, ge=1, le=1024)]
+    rounds: Annotated[int, Field(strict=True, ge=1, le=20)]
+    l2: Annotated[float, Field(ge=0, le=1), _NUMBER]
+    epochs: Annotated[int, Field(strict=True, ge=1, le=100_000)]
+    batch: Annotated[int, Field(strict=True, ge=1, le=1_000_000)]
+    lr: Annotated[float, Field(gt=0, le=1), _NUMBER]
+
+
 class SearchLimits(_Section):
     """Limits of a search: depth and reattempts of the guided one, nodes and paths of any."""
 
@@ -136,6 +150,7 @@ class Params(_Section):
     build_dataset: BuildDataset
     train_policy: TrainPolicy
     train_improved: TrainPolicy
+    train_relational: TrainRelational
     evaluate_generalization: SearchLimits
     compare_scalability: SearchLimits
 

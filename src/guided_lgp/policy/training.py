@@ -120,19 +120,19 @@ class BestParameters(Callback):
     def __init__(self) -> None:
         self.epoch = -1
         self._loss = np.inf
-        self._parameter = torch.empty(0)
+        self._parameters: dict[str, Tensor] = {}
 
     def on_validation_end(self, trainer: lightning.Trainer, module: Any) -> None:
         """Keep the parameters if they are the best so far."""
         loss = module.curves["validation_loss"][-1]
         if loss < self._loss:
             self._loss, self.epoch = loss, len(module.curves["validation_loss"]) - 1
-            self._parameter = module.classifier.parameter.detach().clone()
+            self._parameters = {name: part.clone() for name, part in module.state_dict().items()}
 
     def on_train_end(self, trainer: lightning.Trainer, module: Any) -> None:
         """Restore the best parameters."""
         if self.epoch >= 0:
-            module.classifier.parameter.data.copy_(self._parameter)
+            module.load_state_dict(self._parameters)
 
 
 @dataclass(frozen=True)
@@ -176,7 +176,7 @@ def fit(
     sizes = [training[0].shape[1], *[settings.nodes] * settings.layers, classes]
     module = SubPolicy(Classifier(sizes, settings.dropout, weights), settings)
     best = BestParameters()
-    with _one_quiet_thread():
+    with one_quiet_thread():
         lightning.Trainer(
             accelerator="cpu",
             devices=1,
@@ -202,7 +202,7 @@ def fit(
 
 
 @contextmanager
-def _one_quiet_thread() -> Iterator[None]:
+def one_quiet_thread() -> Iterator[None]:
     """One thread, and no hints from Lightning about hardware, data loaders or its services."""
     threads, messages = torch.get_num_threads(), logging.getLogger("lightning.pytorch")
     level = messages.level

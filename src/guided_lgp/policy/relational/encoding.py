@@ -1,0 +1,227 @@
+"""What the relational policy sees: symbols as nodes, what holds between them as edges.
+
+Nodes are the symbols of logic type table: surfaces, then boxes. There is one graph per gripper, in
+that gripper's own frame: mirrored such that the gripper is the left one. Renaming boxes permutes
+the nodes, and mirroring the scene swaps the graphs, so that the policy need not learn either.
+
+No feature counts anything, and positions are clipped to the range of the training data: more boxes
+than in training, or higher towers, look like more of the same.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from guided_lgp.logic import Objective, State, Symbols
+from guided_lgp.policy.encoding import FloatArray
+
+NO_GOAL = -1
+GOAL_HELD = -2
+
+NODE_FEATURES = (
+    "x",
+    "y towards the gripper's side",
+    "z",
+    "held by the gripper",
+    "held by another gripper",
+    "is a box",
+    "goal: be held",
+    "goal: stand elsewhere",
+    "goal: holds",
+    "settled: stands where it may stay, and so does all below it",
+    "carries a box",
+    "carries, directly or through others, a box with an open goal",
+    "gripper is free",
+    "another gripper is free",
+)
+"""Inputs of every node; the last two are the same for all nodes of a graph."""
+
+CARRIES = "carries, directly or through others"
+
+EDGE_FEATURES = (
+    "stands on",
+    "carries",
+    "stands on, directly or through others",
+    CARRIES,
+    "shall stand on",
+    "shall carry",
+    "relative x",
+    "relative y",
+    "relative z",
+)
+"""Inputs of every ordered pair of nodes, from the first one's point of view."""
+
+SIDES = (1.0, -1.0)
+"""Sign of y on each gripper's own side: the grippers are declared left, then right."""
+
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Situations:
+    """Symbolic states with their positions and goals: B problems with the same numbers of symbols.
+
+    Tables are numbered surfaces first, then boxes; n boxes and T tables.
+    """
+
+    positions: FloatArray
+    """(B, T, 3) in m, in the world."""
+    supports: IntArray
+    """(B, n) what each box stands on; -1 - g when held by gripper g."""
+    goals: IntArray
+    """(B, n) what each box shall stand on, or :data:`GOAL_HELD`, or :data:`NO_GOAL`."""
+
+    def __getitem__(self, rows: IntArray | BoolArray) -> "Situations":
+        return Situations(self.positions[rows], self.supports[rows], self.goals[rows])
+
+
+@dataclass(frozen=True)
+class Graphs:
+    """The inputs of the network; G graphs per problem, one for each gripper."""
+
+    nodes: FloatArray
+    """(B, G, T, node features)."""
+    edges: FloatArray
+    """(B, G, T, T, edge features)."""
+    held: IntArray
+    """(B, G) the table number of the box that the gripper holds, or -1."""
+
+
+@dataclass(frozen=True)
+class Range:
+    """Smallest and largest x, y (on the gripper's side) and z in m of what stands, in training."""
+
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
+
+    @classmethod
+    def of(cls, situations: Situations) -> "Range":
+        """The range of all symbols that no gripper holds."""
+        surfaces = situations.positions.shape[1] - situations.supports.shape[1]
+        standing = np.pad(situations.supports >= 0, ((0, 0), (surfaces, 0)), constant_values=True)
+        found = situations.positions[standing]
+        both = np.concatenate([found, found * np.array([1, -1, 1], dtype=np.float32)])
+        return cls(tuple(both.min(axis=0).tolist()), tuple(both.max(axis=0).tolist()))
+
+    def scaled(self, positions: FloatArray) -> FloatArray:
+        """Positions (..., 3) as numbers from -1 to 1."""
+        lower, upper = (np.array(part, dtype=np.float32) for part in (self.lower, self.upper))
+        return np.clip((2 * positions - lower - upper) / (upper - lower), -1, 1)
+
+
+def situation(
+    objective: Objective,
+    state: State,
+    positions: Mapping[str, NDArray[np.float64]],
+    symbols: Symbols,
+) -> Situations:
+    """One problem (B = 1).
+
+    Args:
+        objective: the goals; each box has at most one.
+        state: the symbolic state.
+        positions: world position (3,) in m of every symbol.
+        symbols: grippers, boxes and surfaces.
+    """
+    tables = symbols.surfaces + symbols.boxes
+    number = {name: index for index, name in enumerate(tables)}
+    number |= {name: -1 - index for index, name in enumerate(symbols.grippers)}
+    place = {box: number[where] for box, where in state.support + state.held}
+    goals = {
+        goal.box: GOAL_HELD if goal.table is None else number[goal.table] for goal in objective
+    }
+    return Situations(
+        positions=np.array([[positions[name] for name in tables]], dtype=np.float32),
+        supports=np.array([[place[box] for box in symbols.boxes]]),
+        goals=np.array([[goals.get(box, NO_GOAL) for box in symbols.boxes]]),
+    )
+
+
+def graphs(situations: Situations, limits: Range) -> Graphs:
+    """Build the graphs of all problems, one per gripper."""
+    supports, goals = situations.supports, situations.goals
+    boxes, tables = supports.shape[1], situations.positions.shape[1]
+    holder = np.stack([supports == -1 - gripper for gripper in range(len(SIDES))], axis=1)
+    free: BoolArray = ~np.logical_or.reduce(holder, axis=2)
+
+    holds = np.where(goals == GOAL_HELD, supports < 0, supports == goals)
+    goal_open = (goals != NO_GOAL) & ~holds
+    on = _relation(supports, tables)
+    above = _closure(on)
+    shall = _relation(np.where(goal_open, goals, NO_GOAL), tables)
+
+    def of_tables(of_boxes: BoolArray) -> FloatArray:
+        surfaces = np.zeros((*of_boxes.shape[:-1], tables - boxes), dtype=np.float32)
+        return np.concatenate([surfaces, of_boxes], axis=-1, dtype=np.float32)
+
+    in_hand = of_tables(supports < 0)
+    unsettled = np.maximum(of_tables(goal_open), in_hand)
+    carried = np.swapaxes(above, 1, 2)
+    symbolic = [
+        of_tables(np.ones_like(holds)),
+        of_tables(goal_open & (goals == GOAL_HELD)),
+        of_tables(goal_open & (goals >= 0)),
+        of_tables(holds),
+        1 - np.maximum(unsettled, _any(above, unsettled)),
+        on.max(axis=1),
+        _any(carried, of_tables(goal_open)),
+    ]
+    by_gripper = []
+    relative = []
+    for gripper, side in enumerate(SIDES):
+        mirror = np.array([1, side, 1], dtype=np.float32)
+        position = limits.scaled(situations.positions * mirror)
+        position *= 1 - in_hand[..., None]  # whose hand it is says more
+        by_other = np.logical_or.reduce(np.delete(holder, gripper, axis=1), axis=1)
+        other_free = np.logical_or.reduce(np.delete(free, gripper, axis=1), axis=1)
+        arms = [np.tile(flag[:, None], tables) for flag in (free[:, gripper], other_free)]
+        hands = [of_tables(holder[:, gripper]), of_tables(by_other)]
+        flags = np.stack([*hands, *symbolic, *arms], axis=-1, dtype=np.float32)
+        by_gripper.append(np.concatenate([position, flags], axis=-1))
+        relative.append(position[:, None] - position[:, :, None])
+    relations = np.stack(
+        [on, np.swapaxes(on, 1, 2), above, carried, shall, np.swapaxes(shall, 1, 2)], axis=-1
+    )
+    edges = [np.concatenate([relations, part], axis=-1) for part in relative]
+    return Graphs(
+        nodes=np.stack(by_gripper, axis=1),
+        edges=np.stack(edges, axis=1),
+        held=np.where(free, -1, holder.argmax(axis=2) + tables - boxes),
+    )
+
+
+def applicable(situations: Situations, inputs: Graphs) -> BoolArray:
+    """(B, G, T) what each gripper can do: grasp a box, or place what it holds on a table."""
+    count, _, tables, _ = inputs.nodes.shape
+    graspable = np.zeros((count, 1, tables), dtype=bool)
+    graspable[:, 0, tables - situations.supports.shape[1] :] = situations.supports >= 0
+    held = inputs.held[..., None]
+    carried = inputs.edges[..., EDGE_FEATURES.index(CARRIES)] > 0
+    barred = np.take_along_axis(carried, held[..., None], axis=2)[:, :, 0]
+    return np.where(held < 0, graspable, ~barred & (np.arange(tables) != held))
+
+
+def _relation(targets: IntArray, tables: int) -> FloatArray:
+    """(B, T, T) 1 from each box to its target; a negative target is none."""
+    boxes = targets.shape[1]
+    relation = np.zeros((len(targets), tables, tables), dtype=np.float32)
+    relation[:, tables - boxes :] = targets[..., None] == np.arange(tables)
+    return relation
+
+
+def _closure(relation: FloatArray) -> FloatArray:
+    """The transitive closure, by squaring."""
+    length = 1
+    while length < relation.shape[1]:
+        relation = np.minimum(relation + relation @ relation, 1)
+        length *= 2
+    return relation
+
+
+def _any(relation: FloatArray, flag: FloatArray) -> FloatArray:
+    """(B, T) whether the flag holds for any node that a node is related to."""
+    found: FloatArray = np.minimum((relation @ flag[..., None])[..., 0], 1)
+    return found

@@ -1,0 +1,54 @@
+"""The trained relational policy: a probability over high-level actions, without torch."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from guided_lgp.logic import Action, Objective, State, Symbols
+from guided_lgp.policy.relational.encoding import graphs, situation
+from guided_lgp.policy.relational.model import Weights, load_weights
+from guided_lgp.scene import GRIPPERS
+
+
+class RelationalPolicy:
+    """Scores actions on any number of boxes and tables, with any number of goals."""
+
+    def __init__(self, weights: Weights) -> None:
+        self._weights = weights
+
+    def log_probabilities(
+        self,
+        objective: Objective,
+        state: State,
+        positions: Mapping[str, NDArray[np.float64]],
+        actions: Sequence[Action],
+    ) -> NDArray[np.float64]:
+        """Score applicable actions; see :class:`guided_lgp.search.policy.Policy`."""
+        boxes = {name for name, _ in state.support + state.held}
+        symbols = Symbols(
+            grippers=GRIPPERS,
+            boxes=tuple(name for name in positions if name in boxes),
+            surfaces=tuple(name for name in positions if name not in {*GRIPPERS, *boxes}),
+        )
+        problem = situation(objective, state, positions, symbols)
+        scores = self._weights.scores(graphs(problem, self._weights.limits))[0]
+        gripper = {name: row for row, name in enumerate(symbols.grippers)}
+        table = {name: column for column, name in enumerate(symbols.tables)}
+        own = np.array(
+            [scores[gripper[a.gripper], table[a.table or a.box]] for a in actions], dtype=float
+        )
+        own -= own.max()
+        log_p: NDArray[np.float64] = own - np.log(np.exp(own).sum())
+        return log_p
+
+
+def load_relational(directory: Path) -> RelationalPolicy:
+    """Read the trained relational policy.
+
+    Raises:
+        InputError: a file is missing, damaged, or of another version; the message names the stage
+            that makes it.
+    """
+    return RelationalPolicy(load_weights(directory))

@@ -1,0 +1,91 @@
+"""The samples of the data set as graphs with all right actions."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from guided_lgp.errors import InputError
+from guided_lgp.policy.dataset import Dataset
+from guided_lgp.policy.encoding import GOAL_KINDS, Encoding
+from guided_lgp.policy.relational.encoding import (
+    GOAL_HELD,
+    NO_GOAL,
+    SIDES,
+    BoolArray,
+    IntArray,
+    Situations,
+)
+
+
+@dataclass(frozen=True)
+class Examples:
+    """Distinct problems (configuration, symbolic state, goals), each with all right actions."""
+
+    situations: Situations
+    right: BoolArray
+    """(N, G, T) whether grasping a box, or placing what is held on a table, by a gripper begins
+    the rest of a shortest sequence."""
+    configuration: NDArray[np.int16]
+    """(N,) index of the configuration."""
+
+    def __len__(self) -> int:
+        return len(self.configuration)
+
+    def __getitem__(self, rows: IntArray | BoolArray) -> "Examples":
+        return Examples(self.situations[rows], self.right[rows], self.configuration[rows])
+
+
+def examples(dataset: Dataset) -> Examples:
+    """Group the samples by problem; of those in one group, the first gives the positions.
+
+    Where goals hold already, a second problem has the others alone: that is what objective
+    adaptation asks for.
+
+    Raises:
+        InputError: the samples are encoded otherwise than the paper's.
+    """
+    encoding = dataset.encoding
+    if encoding != Encoding():
+        raise InputError(
+            "data set", "is encoded as a variant", "the samples of the paper's networks"
+        )
+    supports = dataset.supports[dataset.sample_state].astype(np.int64)
+    goals = _goals(dataset)[dataset.sample_goals]
+    kept = np.where((goals == supports) | ((goals == GOAL_HELD) & (supports < 0)), NO_GOAL, goals)
+    sample = np.tile(np.arange(len(dataset)), 2)
+    goals = np.concatenate([goals, kept])
+    state = dataset.sample_state[sample]
+    configuration = dataset.configuration[state]
+    keys = np.column_stack([configuration, dataset.supports[state], goals])
+    _, first, group = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+
+    instruction, gripper, box, table = dataset.actions[state].T.astype(np.int64)
+    tables = encoding.surfaces + encoding.boxes
+    target = np.where(instruction == 0, encoding.surfaces + box, table)
+    right = np.zeros((len(first), len(SIDES), tables), dtype=bool)
+    right[group, gripper, target] = True
+    positions = dataset.states[state[first]].reshape(len(first), -1, 3)[:, encoding.grippers :]
+    boxes, surfaces = np.split(positions, [encoding.boxes], axis=1)
+    return Examples(
+        Situations(
+            np.concatenate([surfaces, boxes], axis=1),
+            dataset.supports[state[first]].astype(np.int64),
+            goals[first],
+        ),
+        right,
+        configuration[first],
+    )
+
+
+def _goals(dataset: Dataset) -> IntArray:
+    """(objectives, boxes) the encoded objectives as what each box shall stand on."""
+    encoding = dataset.encoding
+    codes = dataset.goals.reshape(len(dataset.goals), encoding.goals, encoding.goal_size)
+    kind, box, table = np.split(codes, [2, 2 + encoding.boxes], axis=2)
+    places = np.where(
+        kind.argmax(axis=2) == GOAL_KINDS.index("held"), GOAL_HELD, table.argmax(axis=2)
+    )
+    goals = np.full((len(codes), encoding.boxes), NO_GOAL)
+    np.put_along_axis(goals, box.argmax(axis=2), places, axis=1)
+    return goals

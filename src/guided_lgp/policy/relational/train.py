@@ -1,0 +1,120 @@
+"""Trains the relational policy from the samples of the paper's networks."""
+
+import logging
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from guided_lgp.errors import InputError
+from guided_lgp.parallel import run
+from guided_lgp.params import Parallel, TrainRelational
+from guided_lgp.policy.dataset import Dataset
+from guided_lgp.policy.encoding import INSTRUCTIONS
+from guided_lgp.policy.relational.encoding import BoolArray
+from guided_lgp.policy.relational.model import NAME, Model
+from guided_lgp.policy.relational.samples import Examples, examples
+from guided_lgp.policy.relational.training import Fit, fit
+from guided_lgp.policy.train import SPLITS, TrainingReport
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class _Task:
+    split: str
+    problems: Examples
+    validation: BoolArray
+    """(N,) the problems for validation."""
+    settings: TrainRelational
+
+
+def train_relational(
+    dataset: Dataset, settings: TrainRelational, parallel: Parallel, directory: Path
+) -> TrainingReport:
+    """Train the relational network and save it.
+
+    As for the paper's networks, a random choice of validation problems decides about the weights,
+    and the training is repeated with whole configurations held out, for the report alone.
+
+    Args:
+        dataset: the training samples, as the paper's networks get them.
+        settings: of the network and its training.
+        parallel: back end and workers; the result does not depend on them.
+        directory: for ``relational.safetensors`` and ``relational.json``.
+
+    Returns:
+        The report, with the whole action as its one sub-policy.
+
+    Raises:
+        InputError: too few problems to split, or a training that diverges at once.
+    """
+    problems = examples(dataset)
+    tasks = [
+        _Task(split, problems, _held_out(problems, split, settings), settings) for split in SPLITS
+    ]
+    for task in tasks:
+        held_out = np.count_nonzero(task.validation)
+        if not 0 < held_out < len(problems):
+            raise InputError(
+                "train_relational.validation_share",
+                f"{held_out} of {len(problems)} problems for validation (split: {task.split})",
+                "a share that leaves problems on both sides; or more configurations",
+            )
+    fits = dict(zip(SPLITS, run(_train, tasks, parallel, "training relational"), strict=True))
+    training = {"samples": len(problems), **settings.model_dump()}
+    Model(fits["random"].weights, training).save(directory)
+    return TrainingReport(
+        network=NAME,
+        seed=settings.seed,
+        samples=len(problems),
+        sub_policies={
+            "action": {
+                "classes": INSTRUCTIONS,
+                **_figures(fits["random"]),
+                "by_configuration": _figures(fits["configuration"]),
+            }
+        },
+    )
+
+
+def _held_out(problems: Examples, split: str, settings: TrainRelational) -> BoolArray:
+    rng = np.random.default_rng(np.random.SeedSequence([settings.seed, SPLITS.index(split)]))
+    unit = np.arange(len(problems)) if split == "random" else problems.configuration
+    units = np.unique(unit)
+    chosen = rng.permutation(units)[: max(1, round(settings.validation_share * len(units)))]
+    return np.isin(unit, chosen)
+
+
+def _train(task: _Task) -> Fit:
+    result = fit(
+        task.problems[~task.validation],
+        task.problems[task.validation],
+        task.settings,
+        np.random.SeedSequence([task.settings.seed, len(SPLITS)]),
+    )
+    best = result.best_epoch - 1
+    logger.info(
+        "%s.%s: validation loss %.3f, accuracy %.4f at epoch %d of %d",
+        NAME,
+        task.split,
+        result.curves["validation_loss"][best],
+        result.curves["validation_accuracy"][best],
+        result.best_epoch,
+        len(result.curves["validation_loss"]),
+    )
+    return result
+
+
+def _figures(result: Fit) -> dict[str, Any]:
+    curves = result.curves
+    best = result.best_epoch - 1
+    return {
+        "accuracy": curves["validation_accuracy"][best],
+        "loss": curves["validation_loss"][best],
+        "epochs": len(curves["validation_loss"]),
+        "best_epoch": result.best_epoch,
+        "confusion": result.confusion.tolist(),
+        "curves": curves,
+    }

@@ -1,0 +1,186 @@
+"""The relational network in Lightning: mini-batches, early stopping, learning curves."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from math import ceil
+
+import lightning
+import numpy as np
+import torch
+from lightning.pytorch.callbacks import EarlyStopping
+from numpy.typing import NDArray
+from torch import Tensor
+from torch.optim import Adam, Optimizer
+from torch.optim.lr_scheduler import CosineAnnealingLR
+
+from guided_lgp.errors import InputError
+from guided_lgp.params import TrainRelational
+from guided_lgp.policy.encoding import INSTRUCTIONS
+from guided_lgp.policy.relational.encoding import Range, applicable, graphs
+from guided_lgp.policy.relational.model import Weights
+from guided_lgp.policy.relational.network import RelationalNetwork
+from guided_lgp.policy.relational.samples import Examples
+from guided_lgp.policy.training import BestParameters, one_quiet_thread
+
+CURVES = ("training_loss", "training_accuracy", "validation_loss", "validation_accuracy")
+
+Batch = tuple[Tensor, Tensor, Tensor, Tensor, Tensor]
+"""Nodes, edges, held, applicable and right actions."""
+
+
+class Batches:
+    """All examples in mini-batches, in an order drawn anew for every epoch if given a generator."""
+
+    def __init__(
+        self, examples: Examples, limits: Range, size: int, rng: np.random.Generator | None = None
+    ) -> None:
+        inputs = graphs(examples.situations, limits)
+        arrays = (
+            inputs.nodes,
+            inputs.edges,
+            inputs.held,
+            applicable(examples.situations, inputs),
+            examples.right,
+        )
+        self._tensors = [torch.from_numpy(array) for array in arrays]
+        self._count, self._size, self._rng = len(examples), size, rng
+
+    def __len__(self) -> int:
+        return ceil(self._count / self._size)
+
+    def __iter__(self) -> Iterator[Batch]:
+        order = np.arange(self._count) if self._rng is None else self._rng.permutation(self._count)
+        for rows in torch.split(torch.from_numpy(order), self._size):
+            nodes, edges, held, allowed, right = (tensor[rows] for tensor in self._tensors)
+            yield nodes, edges, held, allowed, right
+
+
+class RelationalPolicyModule(lightning.LightningModule):
+    """Adam on the cross-entropy between the right actions, each as probable, and the policy."""
+
+    def __init__(self, network: RelationalNetwork, settings: TrainRelational) -> None:
+        super().__init__()
+        self.network = network
+        self.curves: dict[str, list[float]] = {name: [] for name in CURVES}
+        self._settings = settings
+        self._sums = {"training": [0.0, 0.0, 0.0], "validation": [0.0, 0.0, 0.0]}
+
+    def configure_optimizers(self) -> tuple[list[Optimizer], list[CosineAnnealingLR]]:
+        """Adam with L2 regularisation; the learning rate falls to zero along a cosine."""
+        optimizer = Adam(
+            self.network.parameters(), self._settings.lr, weight_decay=self._settings.l2, fused=True
+        )
+        schedule = CosineAnnealingLR(optimizer, self._settings.epochs)
+        return [optimizer], [schedule]
+
+    def training_step(self, batch: Batch, index: int) -> Tensor:
+        """Loss of a mini-batch."""
+        return self._loss("training", batch)
+
+    def validation_step(self, batch: Batch, index: int) -> None:
+        """Loss and accuracy on the validation examples."""
+        self._loss("validation", batch)
+
+    def on_train_epoch_end(self) -> None:
+        """Note the curves; Lightning validates before this is called."""
+        self._note("training")
+
+    def on_validation_epoch_end(self) -> None:
+        """Note the curves, and log the loss, by which training stops."""
+        self._note("validation")
+        self.log("validation_loss", self.curves["validation_loss"][-1])
+
+    def _loss(self, split: str, batch: Batch) -> Tensor:
+        log_p, right = log_probabilities(self.network, batch), batch[-1].flatten(1)
+        shares = right / right.sum(1, keepdim=True)
+        loss = -(shares * log_p.masked_fill(~right, 0)).sum(1).mean()
+        hits = right.gather(1, log_p.argmax(1, keepdim=True)).float().sum()
+        for index, value in enumerate((loss.item() * len(right), hits.item(), len(right))):
+            self._sums[split][index] += value
+        return loss
+
+    def _note(self, split: str) -> None:
+        loss, hits, count = self._sums[split]
+        self.curves[f"{split}_loss"].append(loss / count)
+        self.curves[f"{split}_accuracy"].append(hits / count)
+        self._sums[split] = [0.0, 0.0, 0.0]
+
+
+def log_probabilities(network: RelationalNetwork, batch: Batch) -> Tensor:
+    """(B, G · T) log-probability of every action; minus infinity where it is not applicable."""
+    nodes, edges, held, allowed, _ = batch
+    scores = network(nodes.flatten(0, 1), edges.flatten(0, 1), held.flatten())
+    chosen = torch.where(held.flatten()[:, None] < 0, scores[:, 0], scores[:, 1])
+    masked = chosen.view_as(allowed).masked_fill(~allowed, -torch.inf)
+    return torch.log_softmax(masked.flatten(1), dim=1)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A trained network."""
+
+    weights: Weights
+    """Of the best epoch."""
+    best_epoch: int
+    """From 1; the epoch of the lowest validation loss."""
+    curves: Mapping[str, list[float]]
+    """Loss (nats) and accuracy per epoch: the share of problems whose most probable action is one
+    of the right ones."""
+    confusion: NDArray[np.int64]
+    """(2, 2) validation problems by instruction: of the most probable right action (row), and of
+    the most probable one."""
+
+
+def fit(
+    training: Examples,
+    validation: Examples,
+    settings: TrainRelational,
+    seed: np.random.SeedSequence,
+) -> Fit:
+    """Train a network until its validation loss stops falling.
+
+    The result depends on the arguments alone: one thread, and random streams of its own.
+
+    Raises:
+        InputError: the validation loss was never finite.
+    """
+    weights, order = seed.spawn(2)
+    limits = Range.of(training.situations)
+    batches = Batches(training, limits, settings.batch, np.random.default_rng(order))
+    held_out = Batches(validation, limits, settings.batch)
+    best = BestParameters()
+    with one_quiet_thread(), torch.random.fork_rng(devices=[]):
+        torch.manual_seed(int(weights.generate_state(1)[0]))
+        network = RelationalNetwork(settings.width, settings.rounds)
+        module = RelationalPolicyModule(network, settings)
+        lightning.Trainer(
+            accelerator="cpu",
+            devices=1,
+            max_epochs=settings.epochs,
+            callbacks=[best, EarlyStopping("validation_loss", patience=settings.patience)],
+            logger=False,  # the curves are part of the result, and MLflow gets them from there
+            num_sanity_val_steps=0,
+            enable_checkpointing=False,
+            enable_progress_bar=False,
+            enable_model_summary=False,
+        ).fit(module, batches, held_out)
+        if best.epoch < 0:
+            raise InputError(
+                "train_relational: lr", "the loss is not finite", "a smaller learning rate"
+            )
+        confusion = _confusion(network, held_out)
+    tensors = {name: part.numpy().copy() for name, part in network.state_dict().items()}
+    return Fit(Weights(limits, tensors), best.epoch + 1, module.curves, confusion)
+
+
+@torch.no_grad()
+def _confusion(network: RelationalNetwork, batches: Batches) -> NDArray[np.int64]:
+    count = len(INSTRUCTIONS)
+    confusion = torch.zeros(count * count, dtype=torch.int64)
+    for batch in batches:
+        log_p, held, right = log_probabilities(network, batch), batch[2], batch[-1]
+        place = (held >= 0)[..., None].expand_as(right).flatten(1).long()
+        truth = log_p.masked_fill(~right.flatten(1), -torch.inf).argmax(1, keepdim=True)
+        cell = count * place.gather(1, truth) + place.gather(1, log_p.argmax(1, keepdim=True))
+        confusion += torch.bincount(cell.flatten(), minlength=count * count)
+    return confusion.view(count, count).numpy()
