@@ -75,12 +75,27 @@ def test_the_file_holds_the_same_scenes_and_the_same_bytes(tmp_path: Path) -> No
     assert (tmp_path / "one.json").read_bytes() == (tmp_path / "two.json").read_bytes()
 
 
-@pytest.mark.parametrize("text", ["{", "[]", '{"version": 2}'])
-def test_a_bad_file_is_named(tmp_path: Path, text: str) -> None:
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("{", "is not JSON"),
+        ("[" * 100_000, "is nested too deeply"),
+        ("[]", "is of version None"),
+        ('{"version": 2}', "is of version 2"),
+        ('{"version": 1}', "setup: unknown setup None"),
+        ('{"version": 1, "setup": 7, "scenes": [], "rejected": 0}', "setup: unknown setup 7"),
+        ('{"version": 1, "setup": "a", "scenes": 5, "rejected": 0}', "scenes: is not a list"),
+        ('{"version": 1, "setup": "a", "scenes": [], "rejected": 0}', "scenes: is not a list"),
+        ('{"version": 1, "setup": "a", "scenes": [1], "rejected": true}', "rejected: is not"),
+        ('{"version": 1, "setup": "a", "scenes": [1], "rejected": 0}', r"scenes\.0: Input should"),
+    ],
+)
+def test_a_bad_file_is_named(tmp_path: Path, text: str, fault: str) -> None:
     path = tmp_path / "scenes.json"
     path.write_text(text)
-    with pytest.raises(InputError, match=r"scenes\.json"):
+    with pytest.raises(InputError, match=rf"scenes\.json: {fault}") as error:
         load_scenes(path)
+    assert "\n" not in str(error.value)
 
 
 def test_a_missing_file_names_the_stage(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import pytest
 
 from guided_lgp.errors import InputError
 from guided_lgp.scene import Scene, generate, parse_scene
+from guided_lgp.scene.setups import SETUPS
 from guided_lgp.scene.validate import validate_scene
 
 
@@ -48,7 +49,7 @@ def test_tower_is_a_good_scene() -> None:
     validate_scene(scene(boxes__1__on="red", boxes__1__position=[0.5, 0.3, 0.75]), "mine.json")
 
 
-@pytest.mark.parametrize("setup", ["a", "b", "c", "d"])
+@pytest.mark.parametrize("setup", SETUPS)
 def test_generated_scenes_are_good(setup: str) -> None:
     for generated in generate(setup, 2, seed=11, prefix="x").scenes:
         validate_scene(generated)
@@ -67,6 +68,10 @@ def test_generated_scenes_are_good(setup: str) -> None:
         ({"boxes__0__on": "tab2"}, "not over tab2"),
         ({"boxes__0__size": [0.15, 0.09, 0.10]}, r"cannot close across 0.09 m.*accepted: 0.02"),
         ({"boxes__0__size": [0.15, 0.01, 0.10]}, "cannot close across 0.01 m"),
+        (
+            {"boxes__0__size": [0.15, 0.07, 0.001], "boxes__0__position": [0.5, 0.3, 0.6005]},
+            "too flat to grasp: 0.001 m high .accepted: at least 0.02 m",
+        ),
         ({"boxes__0__on": "green", "boxes__1__on": "red"}, "in a circle"),
         ({"robot__torso": 0.32}, r"robot\.torso: 0.32 m is out of range"),
         ({"tables__1__position": [0.54, 0.1, 0.6]}, "tab1 and tab2 overlap"),
@@ -86,3 +91,22 @@ def test_fault_is_named(changes: dict[str, Any], fault: str) -> None:
         validate_scene(scene(**changes), "mine.json")
     assert str(error.value).startswith("mine.json: ")
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("changes", "fault"),
+    [
+        ({"boxes__0__position": [True, 0.3, 0.65]}, r"boxes\.0\.position\.0: .*valid number"),
+        ({"boxes__0__yaw": "0.4"}, r"boxes\.0\.yaw: .*valid number"),
+        ({"robot__torso": True}, r"robot\.torso: .*valid number"),
+        ({"tables__1__half_extents": [1e-200, 0.2]}, r"tables\.1\.half_extents\.0: .*0.001"),
+        ({"boxes__0__size": [0.15, 0.07, 1e-9]}, r"boxes\.0\.size\.2: .*0.001"),
+    ],
+)
+def test_a_number_that_is_none_or_too_small_is_refused(changes: dict[str, Any], fault: str) -> None:
+    with pytest.raises(InputError, match=fault):
+        scene(**changes)
+
+
+def test_integers_are_coordinates() -> None:
+    assert scene(robot__base=[0, 0, 0]).robot.base == (0.0, 0.0, 0.0)

@@ -1,6 +1,5 @@
 """Random configurations of the setups (DESIGN §3)."""
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import combinations, cycle
@@ -8,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from guided_lgp.documents import write_json
+from guided_lgp.documents import read_json, write_json
 from guided_lgp.errors import InputError
 from guided_lgp.scene.footprints import footprint, gap, inset
 from guided_lgp.scene.model import Box, Scene, Table, parse_scene
@@ -43,24 +42,25 @@ def load_scenes(path: Path) -> GeneratedScenes:
     """Read what :meth:`GeneratedScenes.save` wrote.
 
     Raises:
-        InputError: the file is missing, of another version, or one of its scenes has a fault.
+        InputError: the file is missing, of another version, or one of its fields has a fault.
     """
-    try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        fault = error.strerror or "cannot be read"
-        raise InputError(str(path), fault, "the output of stage generate_scenes") from None
-    except ValueError as error:
-        raise InputError(str(path), f"is not JSON: {error}") from None
-    if not isinstance(document, dict) or document.get("version") != _VERSION:
-        version = document.get("version") if isinstance(document, dict) else None
+    where, origin = str(path), "the output of stage generate_scenes"
+    document = read_json(path, origin)
+    version = document.get("version") if isinstance(document, dict) else None
+    if version != _VERSION:
         fault = f"is of version {version!r}"
-        raise InputError(str(path), fault, f"version {_VERSION}, from stage generate_scenes")
+        raise InputError(where, fault, f"version {_VERSION}, from stage generate_scenes")
+    setup, listed, rejected = (document.get(key) for key in ("setup", "scenes", "rejected"))
+    if not isinstance(setup, str) or setup not in SETUPS:
+        raise InputError(f"{where}: setup", f"unknown setup {setup!r}", ", ".join(SETUPS))
+    if not isinstance(listed, list) or not listed:
+        raise InputError(f"{where}: scenes", "is not a list of at least one scene", origin)
+    if type(rejected) is not int or rejected < 0:
+        raise InputError(f"{where}: rejected", "is not a number of scenes", origin)
     scenes = tuple(
-        parse_scene(scene, f"{path}: scenes.{index}")
-        for index, scene in enumerate(document["scenes"])
+        parse_scene(scene, f"{where}: scenes.{index}") for index, scene in enumerate(listed)
     )
-    return GeneratedScenes(document["setup"], scenes, document["rejected"])
+    return GeneratedScenes(setup, scenes, rejected)
 
 
 def generate(

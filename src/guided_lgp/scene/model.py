@@ -1,21 +1,22 @@
 """The scene document: robot, tables and boxes (DESIGN §3)."""
 
-import json
 import math
 from pathlib import Path
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from guided_lgp.documents import read_json
 from guided_lgp.errors import InputError
 from guided_lgp.logic import State, Symbols
 
 GRIPPERS = ("pr2L", "pr2R")
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]*$", max_length=32)]
-Coordinate = Annotated[float, Field(ge=-10, le=10, allow_inf_nan=False)]
-Angle = Annotated[float, Field(ge=-2 * math.pi, le=2 * math.pi, allow_inf_nan=False)]
-Length = Annotated[float, Field(gt=0, le=5, allow_inf_nan=False)]
+# strict: neither true nor "0.4" is a number
+Coordinate = Annotated[float, Field(strict=True, ge=-10, le=10, allow_inf_nan=False)]
+Angle = Annotated[float, Field(strict=True, ge=-2 * math.pi, le=2 * math.pi, allow_inf_nan=False)]
+Length = Annotated[float, Field(strict=True, ge=0.001, le=5, allow_inf_nan=False)]
 
 
 class _Document(BaseModel):
@@ -27,7 +28,7 @@ class Robot(_Document):
 
     model: Literal["pr2"] = "pr2"
     base: tuple[Coordinate, Coordinate, Coordinate] = (0.0, 0.0, 0.0)
-    torso: Annotated[float, Field(ge=0.0115, le=0.325)] = 0.28
+    torso: Annotated[float, Field(strict=True, ge=0.0115, le=0.325)] = 0.28
 
 
 class Table(_Document):
@@ -107,10 +108,4 @@ def load_scene(path: Path) -> Scene:
     Raises:
         InputError: the file is missing, is not JSON, or is not a scene.
     """
-    try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(str(path), error.strerror or "cannot be read") from None
-    except ValueError as error:
-        raise InputError(str(path), f"is not JSON: {error}") from None
-    return parse_scene(document, str(path))
+    return parse_scene(read_json(path), str(path))

@@ -29,7 +29,7 @@ def validate_scene(scene: Scene, where: str = "scene") -> None:
     Raises:
         InputError: the first fault found: torso out of range, tables that overlap each other or
             the robot, boxes that overlap, float, sink in, stand in a circle or beside their table,
-            are too wide for the fingers, or out of both arms' reach.
+            are too wide for the fingers, too flat, or out of both arms' reach.
     """
     torso = scene.robot.torso
     low, high = pr2.TORSO_LIMITS
@@ -70,6 +70,9 @@ def _validate_box(scene: Scene, box: Box, where: str) -> None:
             f"the gripper cannot close across {width} m, the narrower horizontal side",
             f"{MIN_SIDE} to {pr2.GRASP_WIDTH} m",
         )
+    if box.size[2] < MIN_SIDE:
+        fault = f"the box is too flat to grasp: {box.size[2]} m high"
+        raise InputError(f"{where}.size", fault, f"at least {MIN_SIDE} m")
     seen, below = [box.name], box.on
     supports = {other.name: other.on for other in scene.boxes}
     while below in supports:
