@@ -1,4 +1,6 @@
 import json
+import zipfile
+from dataclasses import replace
 from itertools import permutations
 from pathlib import Path
 from typing import Any
@@ -317,6 +319,76 @@ def test_missing_and_damaged_data_sets_name_the_stage(dataset: Dataset, tmp_path
     (tmp_path / "dataset.json").write_text(json.dumps(document))
     with pytest.raises(InputError, match=r"encoding\.version: is 99.*build_dataset"):
         load_dataset(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("sample_state", 10**6),
+        ("sample_goals", -1),
+        ("states", np.nan),
+        ("actions", 5),
+        ("supports", -3),
+        ("configuration", 5),
+    ],
+)
+def test_arrays_out_of_range_are_refused(
+    dataset: Dataset, tmp_path: Path, name: str, value: float
+) -> None:
+    array = getattr(dataset, name).copy()
+    array[-1] = value
+    replace(dataset, **{name: array}).save(tmp_path)
+    with pytest.raises(InputError, match=rf"samples\.npz: {name}: are .*build_dataset"):
+        load_dataset(tmp_path)
+
+
+def test_archives_that_cannot_be_unpacked_are_refused(dataset: Dataset, tmp_path: Path) -> None:
+    dataset.save(tmp_path)
+    path = tmp_path / "samples.npz"
+    archive = path.read_bytes()
+    entry = archive.index(b"PK\x01\x02")
+    with zipfile.ZipFile(path) as stored:
+        parts = {name: stored.read(name) for name in stored.namelist()}
+    for offset, value in ((8, 1), (10, 99)):  # encrypted; an unknown method
+        damaged = bytearray(archive)
+        damaged[entry + offset] = value
+        path.write_bytes(damaged)
+        with pytest.raises(InputError, match=r"samples\.npz: is damaged"):
+            load_dataset(tmp_path)
+    shape = str(dataset.states.shape).encode()
+    for other in (b"('a(b'# ", b"(99999999999999, 21)"):
+        with zipfile.ZipFile(path, "w") as archived:
+            for name, content in parts.items():
+                archived.writestr(name, content.replace(shape, other))
+        with pytest.raises(InputError, match=r"samples\.npz: is damaged"):
+            load_dataset(tmp_path)
+
+
+def test_tables_of_other_content_are_refused(
+    world: Enumeration, objectives: list[Objective], tmp_path: Path
+) -> None:
+    frame = pd.read_parquet(world.sequences)
+    odd = tmp_path / "odd.parquet"
+    for column, value in (
+        ("skeleton", "(grasp pr2L pink)"),
+        ("skeleton", "(jump)"),
+        ("skeleton", "(place pr2L red tab1)"),
+        ("feasible", None),
+        ("states", [np.nan] * 42),
+    ):
+        row = next(index for index, feasible in enumerate(frame["feasible"]) if feasible)
+        values = [*frame[column]]
+        values[row] = value
+        frame.assign(**{column: values}).to_parquet(odd)
+        with pytest.raises(InputError, match=r"odd\.parquet: .*enumerate_sequences"):
+            build_dataset(world.scenes, odd, world.shortest, objectives, 0)
+    odd.write_bytes(b"PAR1" + b"\xff" * 60 + b"PAR1")
+    with pytest.raises(InputError, match=r"odd\.parquet: cannot be read"):
+        build_dataset(world.scenes, odd, world.shortest, objectives, 0)
+    lengths = pd.read_parquet(world.shortest)
+    pd.concat([lengths, lengths]).to_parquet(odd)
+    with pytest.raises(InputError, match=r"odd\.parquet: has an objective .* twice"):
+        build_dataset(world.scenes, world.sequences, odd, objectives, 0)
 
 
 def test_sequences_that_do_not_fit_the_scenes_are_refused(

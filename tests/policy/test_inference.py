@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import safetensors.torch
 import torch
 from safetensors.numpy import load_file, save_file
 from synthetic import make_scene, positions_along
@@ -161,8 +162,7 @@ def test_missing_and_damaged_files_name_the_stage(
     (models / name).unlink()
     if damage is not None:
         (models / name).write_bytes(damage)
-    expected = rf"{name}: is {'missing' if damage is None else 'damaged'}.*train_policy"
-    with pytest.raises(InputError, match=expected):
+    with pytest.raises(InputError, match=rf"{name}:? .*train_policy"):
         load_policy(models)
 
 
@@ -172,7 +172,10 @@ def test_missing_and_damaged_files_name_the_stage(
         ({"version": 7}, "version: is 7"),
         ({"encoding": {"version": 7}}, "encoding.version: is 7"),
         ({"network": "grasp"}, "sub_policies: do not fit"),
+        ({"training": None}, "sub_policies: do not fit"),
+        ({"sub_policies": []}, "sub_policies: do not fit"),
         ({"sub_policies": {"gripper": [41, 2]}}, "sub_policies: do not fit"),
+        ({"sub_policies": {"gripper": [41, True, 2], "box": [1], "table": "ab"}}, "do not fit"),
         ({"sub_policies": {"gripper": [40, 2], "box": [43, 3], "table": [46, 5]}}, "do not fit"),
         ({"sub_policies": {"gripper": [41, 2], "box": [43, 3], "table": [46, 5]}}, "2 × 41"),
     ],
@@ -186,10 +189,51 @@ def test_models_that_do_not_fit_are_refused(
         load_policy(models)
 
 
-def test_weights_of_another_shape_are_refused(models: Path) -> None:
+@pytest.mark.parametrize(
+    "bias",
+    [
+        np.zeros(3, np.float32),
+        np.ones((), np.float32),
+        np.zeros((80, 2), np.float32),
+        np.full(80, np.nan, np.float32),
+        np.full(80, np.inf, np.float32),
+        np.zeros(80, np.int8),
+    ],
+    ids=["short", "scalar", "2d", "nan", "infinite", "int8"],
+)
+def test_weights_that_do_not_fit_are_refused(models: Path, bias: Array) -> None:
     path = models / "grasp.safetensors"
-    save_file(load_file(path) | {"box.1.bias": np.zeros(3, np.float32)}, path)
+    save_file(load_file(path) | {"box.1.bias": bias}, path)
     with pytest.raises(InputError, match=r"grasp\.safetensors: box\.1: .*train_policy"):
+        load_policy(models)
+
+
+@pytest.mark.parametrize("kind", [torch.bfloat16, torch.float8_e4m3fn])
+def test_weights_of_types_that_numpy_lacks_are_refused(models: Path, kind: torch.dtype) -> None:
+    path = models / "grasp.safetensors"
+    tensors = {name: torch.from_numpy(part) for name, part in load_file(path).items()}
+    safetensors.torch.save_file(tensors | {"box.1.bias": torch.zeros(80, dtype=kind)}, path)
+    with pytest.raises(InputError, match=r"grasp\.safetensors: .*train_policy"):
+        load_policy(models)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"slots": {"grippers": 2, "boxes": 300_000, "surfaces": 2, "goals": 2}},
+        {"slots": {"grippers": 2, "boxes": -1, "surfaces": 2, "goals": 2}},
+        {"slots": 5},
+        {"chain": 1},
+        {"normalisation": {"centre": ["a"] * 21, "scale": [1.0] * 21}},
+        {"normalisation": {"centre": [0.0] * 21, "scale": [0.0] * 21}},
+        {"normalisation": {"centre": [0.0] * 20, "scale": [1.0] * 20}},
+    ],
+)
+def test_impossible_encodings_are_refused(models: Path, change: dict[str, object]) -> None:
+    document = json.loads((models / "place.json").read_text())
+    document["encoding"] |= change
+    (models / "place.json").write_text(json.dumps(document))
+    with pytest.raises(InputError, match=r"place\.json: encoding: is not .*train_policy"):
         load_policy(models)
 
 
@@ -202,7 +246,7 @@ def test_networks_of_different_encodings_are_refused(models: Path, tmp_path: Pat
 
 
 def test_the_improved_policy_has_a_folder_of_its_own(models: Path) -> None:
-    with pytest.raises(InputError, match=r"improved/instruction\.json: is missing.*train_improved"):
+    with pytest.raises(InputError, match=r"improved/instruction\.json: .*train_improved"):
         load_policy(models, "improved")
     save(models / "improved", Encoding(chain=False))
     assert not load_policy(models, "improved").encoding.chain

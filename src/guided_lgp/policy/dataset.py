@@ -1,14 +1,16 @@
 """The training samples ((g, s_k), a_{k+1}) (paper, Sec. II and Appendix; DESIGN §5)."""
 
-import json
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
+from tokenize import TokenError
+from typing import Any
 from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
-from guided_lgp.documents import write_json, written_whole
+from guided_lgp.documents import read_json, write_json, written_whole
 from guided_lgp.errors import InputError
 from guided_lgp.logic import Objective, Symbols, parse_objective
 from guided_lgp.policy.encoding import CHAINS, INSTRUCTIONS, VERSION, Encoding, FloatArray
@@ -17,6 +19,24 @@ _SAMPLES = "samples.npz"
 _DOCUMENT = "dataset.json"
 _STAGE = "build_dataset"
 _COLUMNS = ("instruction", "gripper", "box", "table")
+
+_REMEDY = f"the output of the stage {_STAGE}"
+
+_ARRAYS = {
+    "states": np.float32,
+    "actions": np.int8,
+    "supports": np.int8,
+    "configuration": np.int16,
+    "goals": np.float32,
+    "sample_state": np.int32,
+    "sample_goals": np.int32,
+}
+
+_DAMAGE = (
+    *(OSError, ValueError, KeyError, TypeError, AttributeError, EOFError, MemoryError),
+    *(BadZipFile, RuntimeError, zlib.error, TokenError),
+)
+"""What NumPy, zipfile and zlib raise for damaged archives."""
 
 IntArray = NDArray[np.int64]
 
@@ -95,16 +115,7 @@ class Dataset:
     def save(self, directory: Path) -> None:
         """Write ``samples.npz`` and ``dataset.json``; the same bytes for the same samples."""
         with written_whole(directory / _SAMPLES) as unfinished:
-            np.savez_compressed(
-                unfinished,
-                states=self.states,
-                actions=self.actions,
-                supports=self.supports,
-                configuration=self.configuration,
-                goals=self.goals,
-                sample_state=self.sample_state,
-                sample_goals=self.sample_goals,
-            )
+            np.savez_compressed(unfinished, **{name: getattr(self, name) for name in _ARRAYS})
         document = {
             "version": VERSION,
             "samples": len(self),
@@ -125,27 +136,73 @@ def load_dataset(directory: Path) -> Dataset:
         InputError: a file is missing, damaged, or of another version.
     """
     path = directory / _DOCUMENT
-    remedy = f"the output of the stage {_STAGE}"
-    try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-        stored = document["encoding"]
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise InputError(str(path), f"cannot be read: {error}", remedy) from None
+    document = read_json(path, _REMEDY)
+    stored = document.get("encoding") if isinstance(document, dict) else None
     encoding = Encoding.parse(stored, str(path), _STAGE)
+    try:
+        symbols = Symbols(
+            grippers=_names(document["grippers"]),
+            boxes=_names(document["boxes"]),
+            surfaces=_names(document["surfaces"]),
+        )
+        objectives = tuple(parse_objective(_names(goals)) for goals in document["objectives"])
+        configurations = _names(document["configurations"])
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(str(path), f"does not describe a data set: {error}", _REMEDY) from None
+    counts = (len(symbols.grippers), len(symbols.boxes), len(symbols.surfaces))
+    if counts != (encoding.grippers, encoding.boxes, encoding.surfaces):
+        raise InputError(str(path), "has other numbers of symbols than its encoding", _REMEDY)
     path = directory / _SAMPLES
     try:
         with np.load(path, allow_pickle=False) as arrays:
             samples = {name: arrays[name] for name in arrays.files}
-        return Dataset(
-            encoding=encoding,
-            symbols=Symbols(
-                grippers=tuple(document["grippers"]),
-                boxes=tuple(document["boxes"]),
-                surfaces=tuple(document["surfaces"]),
-            ),
-            objectives=tuple(parse_objective(goals) for goals in document["objectives"]),
-            configurations=tuple(document["configurations"]),
-            **samples,
-        )
-    except (OSError, ValueError, KeyError, TypeError, EOFError, BadZipFile) as error:
-        raise InputError(str(path), f"cannot be read: {error}", remedy) from None
+    except _DAMAGE as error:
+        fault = "is missing" if isinstance(error, FileNotFoundError) else f"is damaged: {error}"
+        raise InputError(str(path), fault, _REMEDY) from None
+    wrong = _fault(samples, encoding, len(configurations))
+    if wrong is not None:
+        raise InputError(str(path), wrong, _REMEDY)
+    return Dataset(encoding, symbols, objectives, configurations, **samples)
+
+
+def _names(values: object) -> tuple[str, ...]:
+    if not isinstance(values, list) or not all(isinstance(value, str) for value in values):
+        raise TypeError("not a list of names")
+    return tuple(values)
+
+
+def _fault(samples: dict[str, Any], encoding: Encoding, configurations: int) -> str | None:
+    """What is wrong with arrays that were read, if anything is."""
+    if set(samples) != set(_ARRAYS):
+        return f"has the arrays {', '.join(sorted(samples))}"
+    states, goals = len(samples["states"]), len(samples["goals"])
+    widths = {
+        "states": (encoding.state_size,),
+        "goals": (encoding.goals * encoding.goal_size,),
+        "actions": (len(_COLUMNS),),
+        "supports": (encoding.boxes,),
+    }
+    for name, array in samples.items():
+        rows = {"goals": goals, "sample_state": -1, "sample_goals": -1}.get(name, states)
+        shape = (len(array) if rows < 0 else rows, *widths.get(name, ()))
+        if array.dtype != _ARRAYS[name] or array.shape != shape:
+            return f"{name}: are {array.dtype} of shape {array.shape}"
+        if not np.isfinite(array).all():
+            return f"{name}: are not all finite"
+    tables = encoding.classes("table")
+    limits = {
+        "actions": ([0, 0, 0, -1], [2, encoding.grippers, encoding.boxes, tables]),
+        "supports": (-encoding.grippers, tables),
+        "configuration": (0, configurations),
+        "sample_state": (0, states),
+        "sample_goals": (0, goals),
+    }
+    for name, (least, end) in limits.items():
+        if ((samples[name] < least) | (samples[name] >= end)).any():
+            return f"{name}: are out of range"
+    places = samples["actions"][:, 0] == INSTRUCTIONS.index("place")
+    if ((samples["actions"][:, 3] >= 0) != places).any():
+        return "actions: a table without a placement, or the other way round"
+    if len(samples["sample_state"]) != len(samples["sample_goals"]):
+        return "sample_goals: not as many as sample_state"
+    return None

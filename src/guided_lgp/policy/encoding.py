@@ -7,6 +7,7 @@ and actions into numbers once the slots are filled.
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -31,6 +32,7 @@ CHAINS: Mapping[str, tuple[str, ...]] = {
 NOWHERE = 127
 """The code of a box that is at no table or gripper of the slots."""
 
+_MOST_SLOTS = 100
 _SLOTS = ("grippers", "boxes", "surfaces", "goals")
 _FLAGS = ("chain", "named_first", "relative", "meaning")
 
@@ -281,6 +283,20 @@ class Encoding:
             "inputs": list(self.input_names),
         }
 
+    def _possible(self) -> bool:
+        """Whether the values, which a file may have made up, are of the right types and sizes."""
+        slots = [getattr(self, name) for name in _SLOTS]
+        flags = [getattr(self, name) for name in _FLAGS]
+        numbers = self.centre + self.scale
+        return (
+            all(type(count) is int and 1 <= count <= _MOST_SLOTS for count in slots)
+            and all(type(flag) is bool for flag in flags)
+            and all(type(number) is float and isfinite(number) for number in numbers)
+            and all(scale > 0 for scale in self.scale)
+            and len(self.scale) == len(self.centre)
+            and len(self.scale) in (0, self.position_size)
+        )
+
     @classmethod
     def parse(cls, document: object, where: str, stage: str) -> "Encoding":
         """Read what :meth:`document` wrote.
@@ -304,9 +320,7 @@ class Encoding:
                 centre=tuple(document["normalisation"]["centre"]),
                 scale=tuple(document["normalisation"]["scale"]),
             )
-            faithful = document == encoding.document()
-            faithful &= len(encoding.scale) in (0, encoding.position_size)
-            faithful &= len(encoding.scale) == len(encoding.centre)
+            faithful = encoding._possible() and document == encoding.document()
         except (KeyError, TypeError, ValueError):
             faithful = False
         if not faithful:

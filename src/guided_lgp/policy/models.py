@@ -1,15 +1,15 @@
 """The files of a trained network: safetensors for the weights, JSON for what they mean."""
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from safetensors import SafetensorError
 from safetensors.numpy import load_file, save
 
-from guided_lgp.documents import write_json, written_whole
+from guided_lgp.documents import read_json, write_json, written_whole
 from guided_lgp.errors import InputError
 from guided_lgp.policy.encoding import CHAINS, VERSION, Encoding, FloatArray
 
@@ -63,12 +63,8 @@ def load_model(directory: Path, network: str, stage: str = "train_policy") -> Mo
     """
     path = directory / f"{network}.json"
     remedy = f"version {VERSION}, the output of the stage {stage}"
-    try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-        version = document["version"]
-    except (OSError, ValueError, TypeError, KeyError) as error:
-        fault = "is missing" if isinstance(error, FileNotFoundError) else "is damaged"
-        raise InputError(str(path), fault, remedy) from None
+    document = read_json(path, remedy)
+    version = document.get("version") if isinstance(document, dict) else None
     if version != VERSION:
         raise InputError(f"{path}: version", f"is {version!r}", remedy)
     encoding = Encoding.parse(document.get("encoding"), str(path), stage)
@@ -78,7 +74,8 @@ def load_model(directory: Path, network: str, stage: str = "train_policy") -> Mo
     path = directory / f"{network}.safetensors"
     try:
         tensors = load_file(path)
-    except (OSError, SafetensorError) as error:
+    except (OSError, SafetensorError, TypeError, AttributeError, ValueError) as error:
+        # The last three: a type of numbers that NumPy does not have, such as bfloat16.
         fault = "is missing" if isinstance(error, FileNotFoundError) else "is damaged"
         raise InputError(str(path), fault, remedy) from None
     sub_policies = {}
@@ -87,8 +84,13 @@ def load_model(directory: Path, network: str, stage: str = "train_policy") -> Mo
         for index, shape in enumerate(zip(widths[1:], widths[:-1], strict=True)):
             weight = tensors.get(f"{name}.{index}.weight")
             bias = tensors.get(f"{name}.{index}.bias")
-            if weight is None or bias is None or weight.shape != shape or len(bias) != shape[0]:
+            if weight is None or bias is None or (weight.shape, bias.shape) != (shape, shape[:1]):
                 fault = f"does not have the {shape[0]} × {shape[1]} weights that its JSON names"
+                raise InputError(f"{path}: {name}.{index}", fault, remedy)
+            if any(
+                part.dtype != np.float32 or not np.isfinite(part).all() for part in (weight, bias)
+            ):
+                fault = "has weights that are not finite numbers of 32 bits"
                 raise InputError(f"{path}: {name}.{index}", fault, remedy)
             layers.append((weight, bias))
         sub_policies[name] = tuple(layers)
@@ -97,12 +99,18 @@ def load_model(directory: Path, network: str, stage: str = "train_policy") -> Mo
 
 def _sizes(document: Any, network: str, encoding: Encoding) -> dict[str, list[int]] | None:
     """Layer sizes of each sub-policy, or None if they do not fit the chain."""
-    try:
-        sizes = {name: list(map(int, document["sub_policies"][name])) for name in CHAINS[network]}
-        ends = [(widths[0], widths[-1]) for widths in sizes.values()]
-    except (KeyError, IndexError, TypeError, ValueError):
+    described = document.get("sub_policies")
+    if not isinstance(described, dict) or not isinstance(document.get("training"), dict):
         return None
+    sizes = {}
+    for name in CHAINS[network]:
+        widths = described.get(name)
+        if not isinstance(widths, list) or len(widths) < 2:
+            return None
+        if not all(type(width) is int and width > 0 for width in widths):
+            return None
+        sizes[name] = widths
+    ends = [(widths[0], widths[-1]) for widths in sizes.values()]
     classes = [encoding.classes(name) for name in CHAINS[network]]
     expected = list(zip(encoding.chain_inputs(network), classes, strict=True))
-    fits = ends == expected and document.get("network") == network and "training" in document
-    return sizes if fits else None
+    return sizes if ends == expected and document.get("network") == network else None

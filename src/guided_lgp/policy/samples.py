@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from guided_lgp.errors import InputError
@@ -15,7 +17,9 @@ from guided_lgp.logic import (
     Skeleton,
     State,
     Symbols,
+    applicable_actions,
     format_objective,
+    format_skeleton,
     parse_skeleton,
     satisfied,
     successor,
@@ -29,6 +33,21 @@ from guided_lgp.scene import Scene
 _LEAST_DEVIATION = 1e-3  # m; less is no information, and scaling it up would be noise
 _NONE = -1
 PAPER = Variant()
+_VERDICTS = pa.schema(
+    [
+        pa.field("configuration", pa.string(), nullable=False),
+        pa.field("skeleton", pa.string(), nullable=False),
+        pa.field("feasible", pa.bool_(), nullable=False),
+        pa.field("states", pa.list_(pa.float64())),
+    ]
+)
+_LENGTHS = pa.schema(
+    [
+        pa.field("configuration", pa.string(), nullable=False),
+        pa.field("objective", pa.string(), nullable=False),
+        pa.field("length", pa.int32()),
+    ]
+)
 _ENUMERATION = "the output of the stage enumerate_sequences for the same scenes"
 
 BoolArray = NDArray[np.bool_]
@@ -70,8 +89,8 @@ def build_dataset(
     )
     symbols = _common_symbols(scenes, encoding)
     lengths = _shortest_lengths(shortest, scenes, objectives)
-    verdicts = _read(sequences, ["configuration", "skeleton", "feasible", "states"])
-    feasible = verdicts[verdicts["feasible"].astype(bool)]
+    verdicts = _read(sequences, _VERDICTS)
+    feasible = verdicts[verdicts["feasible"]]
     rows_of = {str(name): rows for name, rows in feasible.groupby("configuration")}
     goals = _GoalCodes(objectives, symbols, encoding, variant)
     declared = Slots(symbols.grippers, symbols.boxes, symbols.surfaces, goals=())
@@ -155,14 +174,20 @@ def _feasible_sequences(
     def progress(skeleton: Skeleton) -> tuple[State, ...]:
         if skeleton not in known:
             before = progress(skeleton[:-1])
+            if skeleton[-1] not in applicable_actions(before[-1], symbols):
+                text = f"{scene.name}: {format_skeleton(skeleton)} is not applicable"
+                raise InputError(where, text, _ENUMERATION)
             known[skeleton] = (*before, successor(before[-1], skeleton[-1]))
         return known[skeleton]
 
-    skeletons = [parse_skeleton(text) for text in rows["skeleton"]]
+    try:
+        skeletons = [parse_skeleton(text) for text in rows["skeleton"]]
+    except InputError as error:
+        raise InputError(where, f"skeletons of {scene.name}: {error}", _ENUMERATION) from None
     states = [np.zeros((0, encoding.position_size), dtype=np.float32)]
     for skeleton, flat, own in zip(skeletons, rows["states"], slots, strict=True):
         size = (len(skeleton) + 1) * encoding.position_size
-        if flat is None or len(flat) != size:
+        if flat is None or len(flat) != size or not np.isfinite(flat).all():
             raise InputError(where, f"states of {scene.name}: not {size} numbers", _ENUMERATION)
         positions = np.asarray(flat, np.float32).reshape(-1, len(stored), 3)[:-1]
         order = [stored.index(name) for name in own.symbols if name is not None]
@@ -295,8 +320,10 @@ def _shortest_lengths(
     path: Path, scenes: Sequence[Scene], objectives: Sequence[Objective]
 ) -> FloatArray:
     """(scenes, objectives) shortest feasible lengths; NaN where there is none."""
-    table = _read(path, ["configuration", "objective", "length"])
+    table = _read(path, _LENGTHS)
     lengths = table.set_index(["configuration", "objective"])["length"]
+    if not lengths.index.is_unique:
+        raise InputError(str(path), "has an objective of a configuration twice", _ENUMERATION)
     names = [scene.name for scene in scenes]
     texts = [format_objective(objective) for objective in objectives]
     wanted = pd.MultiIndex.from_product([names, texts])
@@ -306,9 +333,12 @@ def _shortest_lengths(
     return values.reshape(len(names), len(texts))
 
 
-def _read(path: Path, columns: list[str]) -> pd.DataFrame:
+def _read(path: Path, columns: pa.Schema) -> pd.DataFrame:
     try:
-        return pd.read_parquet(path, columns=columns)
-    except (OSError, ValueError) as error:
+        table = pq.read_table(path, columns=columns.names).cast(columns)
+        table.validate(full=True)  # strings that are no UTF-8, for instance
+        frame: pd.DataFrame = table.to_pandas()
+    except (OSError, ValueError, KeyError, pa.ArrowException) as error:
         fault = " ".join(str(error).split())
         raise InputError(str(path), f"cannot be read: {fault}", _ENUMERATION) from None
+    return frame
