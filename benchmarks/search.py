@@ -1,4 +1,4 @@
-"""Benchmark of the planners: logic tree, orderings of best-first search, enumeration.
+"""Benchmark of the planners: logic tree, enumeration, and what the policy adds to the search.
 
 Run after the pipeline, which makes the scenes and the models: python benchmarks/search.py
 """
@@ -6,23 +6,40 @@ Run after the pipeline, which makes the scenes and the models: python benchmarks
 import json
 import sys
 import time
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from statistics import fmean
 from typing import Any
 
+import numpy as np
+
 from guided_lgp.experiments.problems import PROBLEMS
-from guided_lgp.logic import one_goal_objectives, two_goal_objectives
+from guided_lgp.logic import Action, Objective, State, one_goal_objectives, two_goal_objectives
 from guided_lgp.nlp.bounds import SceneBounds
+from guided_lgp.nlp.results import Array
 from guided_lgp.params import Params, load_params
 from guided_lgp.paths import PARAMS, SCENES, TRAINED
-from guided_lgp.policy.inference import load_policy
+from guided_lgp.policy.inference import POLICIES, load_policy
 from guided_lgp.scene import Scene, load_scenes
 from guided_lgp.search import best_first, guided
-from guided_lgp.search.best_first import Ordering
 from guided_lgp.search.enumerate import enumerate_sequences
+from guided_lgp.search.policy import Policy
+from guided_lgp.search.result import SearchResult
 from guided_lgp.search.tree import LogicTree
 
-ORDERINGS: tuple[Ordering, ...] = ("cumulative", "discrepancy")
+
+class Uniform:
+    """The policy that knows nothing: what the best-first search does without one."""
+
+    def log_probabilities(
+        self,
+        objective: Objective,
+        state: State,
+        positions: Mapping[str, Array],
+        actions: Sequence[Action],
+    ) -> Array:
+        """See :class:`guided_lgp.search.policy.Policy`."""
+        return np.full(len(actions), -np.log(len(actions)))
 
 
 def measure(root: Path) -> dict[str, Any]:
@@ -30,12 +47,12 @@ def measure(root: Path) -> dict[str, Any]:
     params = load_params(root / PARAMS)
     scenes = {
         setup: load_scenes(root / SCENES / f"scalability_{setup}.json").scenes[0]
-        for setup in "abcd"
+        for setup in {problem.setup for problem in PROBLEMS}
     }
     return {
         "logic_tree_nodes_per_s": _logic_tree(scenes["d"], params),
         "enumeration_verdicts_per_s": _enumeration(scenes["a"], params),
-        "orderings": _orderings(scenes, params, root),
+        "policies": _policies(scenes, params, root),
     }
 
 
@@ -63,37 +80,38 @@ def _enumeration(scene: Scene, params: Params) -> float:
     return len(found.verdicts) / elapsed
 
 
-def _orderings(scenes: dict[str, Scene], params: Params, root: Path) -> dict[str, Any]:
-    """Greedy and both orderings of best-first: means over the objectives of each problem."""
-    policy = load_policy(root / TRAINED)
+def _policies(scenes: dict[str, Scene], params: Params, root: Path) -> dict[str, Any]:
+    """Greedy and best-first by each policy, and best-first without: means over the objectives."""
+    policies = {name: load_policy(root / TRAINED, name) for name in POLICIES}
+    limits = params.compare_scalability
     figures = {}
     for problem in PROBLEMS:
         scene = scenes[problem.setup]
-        symbols = scene.symbols
         bounds = SceneBounds(scene, params.bounds)
-        objectives = problem.objectives(symbols.boxes)
-        limits = params.compare_scalability
-        results = {
-            "guided": [
-                guided.plan(scene, objective, symbols, bounds, policy, limits)
+        objectives = problem.objectives(scene.symbols.boxes)
+
+        def solve(
+            plan: Callable[..., SearchResult],
+            policy: Policy,
+            scene: Scene = scene,
+            bounds: SceneBounds = bounds,
+            objectives: list[Objective] = objectives,
+        ) -> dict[str, float]:
+            found = [
+                plan(scene, objective, scene.symbols, bounds, policy, limits)
                 for objective in objectives
             ]
-        }
-        for ordering in ORDERINGS:
-            results[ordering] = [
-                best_first.plan(
-                    scene, objective, symbols, bounds, policy, limits, ordering=ordering
-                )
-                for objective in objectives
-            ]
-        figures[problem.name] = {
-            planner: {
+            return {
                 "solved": sum(result.solved for result in found),
                 "expansions": fmean(result.expansions for result in found),
                 "tree_size": fmean(result.tree_size for result in found),
                 "time_s": fmean(result.times.total for result in found),
             }
-            for planner, found in results.items()
+
+        figures[problem.name] = {"uniform_best_first": solve(best_first.plan, Uniform())} | {
+            f"{name}_{search}": solve(plan, policy)
+            for name, policy in policies.items()
+            for search, plan in (("greedy", guided.plan), ("best_first", best_first.plan))
         }
     return figures
 

@@ -1,5 +1,6 @@
 """Tables on disk: whole, versioned, and refused with the stage that makes them."""
 
+from contextlib import suppress
 from pathlib import Path
 
 import pyarrow as pa
@@ -38,3 +39,17 @@ def test_faults_name_the_stage(tmp_path: Path) -> None:
     write_table(path, TABLE)
     with pytest.raises(InputError, match=r"stage some_stage"):
         read_table(path, "some_stage", ["no such column"])
+
+
+def test_damaged_bytes(tmp_path: Path) -> None:
+    """One line for a damaged value, and never another exception."""
+    path = tmp_path / "table.parquet"
+    write_table(path, TABLE)
+    content = path.read_bytes()
+    footer = len(content) - 8 - int.from_bytes(content[-8:-4], "little")
+    for place in range(len(content)):
+        path.write_bytes(content[:place] + bytes([content[place] ^ 0x55]) + content[place + 1 :])
+        rows = None
+        with suppress(InputError):
+            rows = read_table(path, "some_stage", TABLE.column_names)
+        assert rows in (None, TABLE.to_pylist()) or place >= footer

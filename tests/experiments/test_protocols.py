@@ -71,7 +71,7 @@ class Sensible:
 def params(monkeypatch: pytest.MonkeyPatch) -> Params:
     for module in (compare_scalability, evaluate_generalization):
         monkeypatch.setattr(module, "SceneBounds", NothingOnBlue)
-        monkeypatch.setattr(module, "load_policy", lambda directory: Sensible())
+        monkeypatch.setattr(module, "load_policy", lambda directory, name: Sensible())
     return load_params(Path(__file__).parents[2] / "params.yaml")
 
 
@@ -97,8 +97,8 @@ def test_generalization(params: Params, monkeypatch: pytest.MonkeyPatch) -> None
             Path("models"),
         )
     )
-    assert len(rows) == 3 * 87
-    assert sum(row["unseen"] for row in rows) == 3 * 47
+    assert len(rows) == 8 * 87
+    assert sum(row["unseen"] for row in rows) == 8 * 47
     by_text = {format_objective(objective): objective for objective in objectives}
     for row in rows:
         objective = by_text[row["objective"]]
@@ -129,13 +129,14 @@ def test_scalability(params: Params) -> None:
             "b.1", scene, params.bounds, params.compare_scalability, Path("models")
         )
     )
-    planners = ["guided", "guided_best_first", "breadth_first", "breadth_first_graph", "astar"]
+    planners = [*compare_scalability.GUIDED, "breadth_first", "breadth_first_graph", "astar"]
     assert [row["planner"] for row in rows] == 8 * planners
     cells = compare_scalability.summarize(rows)["b.1"]
     times = compare_scalability.summarize_times(rows)["b.1"]
     for planner in planners:
         assert (cells[planner]["objectives"], cells[planner]["solved"]) == (8, 8)
         assert cells[planner]["plan_length_mean"] == 6
+        assert cells[planner]["policy_calls_mean"] == 6 * (planner in compare_scalability.GUIDED)
         assert times[planner]["path_s"] == 2.0  # a known verdict costs what it cost at first
         assert times[planner]["coarse_s"] >= 6 * 0.5
     # Reduced branching, levels 1 to 5 complete: 1 + 6 + 24 + 120 + 480 + 2400 nodes.

@@ -86,3 +86,11 @@ def test_invariants_along_random_sequences(choices: list[int]) -> None:
         for box in SETUP_A.boxes:
             assert box not in state.carried_by(box)
         assert State.of(standing, held) == state
+
+
+@pytest.mark.parametrize(
+    "text", ["grasp pr2L red", "(grasp pr2L red", "(grasp pr2L red) and", "(grasp pr2L red))", "()"]
+)
+def test_nothing_in_a_skeleton_is_ignored(text: str) -> None:
+    with pytest.raises(InputError, match="is not an action"):
+        parse_skeleton(text)

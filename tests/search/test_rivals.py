@@ -8,6 +8,7 @@ from scripted import ScriptedBounds, make_scene
 from guided_lgp.logic import (
     Objective,
     Skeleton,
+    least_actions,
     parse_objective,
     progress,
     satisfied,
@@ -91,6 +92,7 @@ def test_landmark_cut_is_admissible_and_informed() -> None:
         goals = goal_facts(objective)
         for number, state in enumerate(space.states):
             bound = landmark_cut(facts(state, symbols), goals, operators)
+            assert least_actions(state, objective) <= exact[number]
             assert bound <= exact[number]
             assert (bound == 0) == (exact[number] == 0)
             informed += bound == exact[number]

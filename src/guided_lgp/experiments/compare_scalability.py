@@ -1,6 +1,6 @@
 """Stage compare_scalability: the protocol behind Table III.
 
-Every planner solves every objective of problems a.1 to d.2 in every configuration of the setup,
+Every planner solves every objective of problems a.1 to e.10 in every configuration of the setup,
 on the same bounds and within the same limits. A verdict of a bound is computed once, and its
 time counts for every planner that asks for it. Planners without a policy get the paper's reduced
 branching in b.1, c.1 and d.1; the guided ones never do.
@@ -9,7 +9,6 @@ branching in b.1, c.1 and d.1; the guided ones never do.
 import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from statistics import fmean, pstdev
 from typing import Any
@@ -21,13 +20,15 @@ from guided_lgp.documents import write_json
 from guided_lgp.experiments.files import write_table
 from guided_lgp.experiments.memory import peak_mb, reset_peak
 from guided_lgp.experiments.problems import PROBLEMS
-from guided_lgp.logic import format_objective, format_skeleton
+from guided_lgp.logic import Objective, Symbols, format_objective, format_skeleton
 from guided_lgp.nlp.bounds import SceneBounds
 from guided_lgp.params import BoundsParams, Params, SearchLimits
 from guided_lgp.paths import EVALUATION, METRICS, SCENES, TRAINED
-from guided_lgp.policy.inference import load_policy
+from guided_lgp.policy.inference import POLICIES, load_policy
 from guided_lgp.scene import Scene, load_scenes
 from guided_lgp.search import best_first, breadth_first, classical, graph, guided
+from guided_lgp.search.bounds import Bounds
+from guided_lgp.search.policy import Policy
 from guided_lgp.search.result import SearchResult
 
 Row = dict[str, Any]
@@ -37,10 +38,17 @@ UNGUIDED: dict[str, Callable[..., SearchResult]] = {
     "breadth_first_graph": graph.plan,
     "astar": classical.plan,
 }
-GUIDED: dict[str, Callable[..., SearchResult]] = {
-    "guided": guided.plan,
-    "guided_best_first": partial(best_first.plan, ordering="discrepancy"),
+GUIDED: dict[str, tuple[str, Callable[..., SearchResult]]] = {
+    "guided": ("paper", guided.plan),
+    "guided_best_first": ("paper", best_first.plan),
+    "improved": ("improved", guided.plan),
+    "improved_best_first": ("improved", best_first.plan),
+    "relational": ("relational", guided.plan),
+    "relational_best_first": ("relational", best_first.plan),
 }
+"""Policy and search of each guided planner."""
+
+COUNTS = ("expansions", "policy_calls", "coarse_calls", "path_calls")
 TIMES = ("symbolic", "policy", "coarse", "path")
 
 ROWS = pa.schema(
@@ -103,16 +111,12 @@ def compare(task: Task) -> list[Row]:
     problem = next(problem for problem in PROBLEMS if problem.name == task.problem)
     symbols = task.scene.symbols
     bounds = SceneBounds(task.scene, task.bounds)
-    policy = load_policy(task.models)
+    planners = _planners(symbols, problem.unguided_symbols(symbols), bounds, task)
     rows = []
     for objective in problem.objectives(symbols.boxes):
-        question = task.scene, objective
-        for planner, plan in (GUIDED | UNGUIDED).items():
+        for planner, plan in planners.items():
             reset_peak()
-            if planner in GUIDED:
-                result = plan(*question, symbols, bounds, policy, task.limits)
-            else:
-                result = plan(*question, problem.unguided_symbols(symbols), bounds, task.limits)
+            result = plan(objective)
             rows.append(
                 {
                     "problem": problem.name,
@@ -124,6 +128,25 @@ def compare(task: Task) -> list[Row]:
                 }
             )
     return rows
+
+
+def _planners(
+    symbols: Symbols, unguided_symbols: Symbols, bounds: Bounds, task: Task
+) -> dict[str, Callable[[Objective], SearchResult]]:
+    """Every planner, by name, as a function of the objective alone."""
+    policies = {name: load_policy(task.models, name) for name in POLICIES}
+
+    def guided_by(
+        policy: Policy, plan: Callable[..., SearchResult]
+    ) -> Callable[[Objective], SearchResult]:
+        return lambda objective: plan(task.scene, objective, symbols, bounds, policy, task.limits)
+
+    def unguided(plan: Callable[..., SearchResult]) -> Callable[[Objective], SearchResult]:
+        return lambda objective: plan(task.scene, objective, unguided_symbols, bounds, task.limits)
+
+    return {name: guided_by(policies[policy], plan) for name, (policy, plan) in GUIDED.items()} | {
+        name: unguided(plan) for name, plan in UNGUIDED.items()
+    }
 
 
 def _figures(result: SearchResult) -> Row:
@@ -150,7 +173,8 @@ def summarize(rows: Sequence[Row]) -> dict[str, dict[str, Row]]:
     """Table III: problem, then planner, then figures over the problems that it solved.
 
     ``objectives`` and, of these, ``solved`` in every configuration; ``problems``: objectives times
-    configurations, and ``problems_solved`` of them. Means are None where nothing was solved.
+    configurations, and ``problems_solved`` of them. Means are None where nothing was solved; calls
+    are those of one search, whether or not the verdict was known.
     """
     return _by_cell(rows, _sizes)
 
@@ -187,6 +211,7 @@ def _sizes(cell: list[Row]) -> Row:
         "tree_size_mean": _mean(sizes),
         "tree_size_std": _std(sizes),
         "plan_length_mean": _mean([row["length"] for row in solved]),
+        **{f"{count}_mean": _mean([row[count] for row in solved]) for count in COUNTS},
     }
 
 

@@ -32,7 +32,7 @@ from guided_lgp.logic import (
 from guided_lgp.nlp.bounds import SceneBounds
 from guided_lgp.params import BoundsParams, Params, SearchLimits
 from guided_lgp.paths import EVALUATION, METRICS, SCENES, SEQUENCES, TRAINED
-from guided_lgp.policy.inference import load_policy
+from guided_lgp.policy.inference import POLICIES, load_policy
 from guided_lgp.policy.split import training_objectives
 from guided_lgp.scene import Scene, load_scenes
 from guided_lgp.search import best_first, guided
@@ -42,12 +42,17 @@ from guided_lgp.search.result import SearchResult
 
 Row = dict[str, Any]
 
-PLANNERS: Mapping[str, Callable[..., SearchResult]] = {
-    "default": partial(guided.plan, adapt=False),
-    "adaptation": guided.plan,
-    "best_first": partial(best_first.plan, ordering="cumulative"),
+PLANNERS: Mapping[str, tuple[str, Callable[..., SearchResult]]] = {
+    "default": ("paper", partial(guided.plan, adapt=False)),
+    "adaptation": ("paper", guided.plan),
+    "best_first": ("paper", best_first.plan),
+    "improved_default": ("improved", partial(guided.plan, adapt=False)),
+    "improved_adaptation": ("improved", guided.plan),
+    "improved_best_first": ("improved", best_first.plan),
+    "relational": ("relational", guided.plan),
+    "relational_best_first": ("relational", best_first.plan),
 }
-"""``best_first`` adapts the objective, too; its ordering is the one that favours short plans."""
+"""Policy and search of each row of Table I; all but the ``default`` ones adapt the objective."""
 
 OUTCOMES = ("shortest", "feasible", "no_solution")
 
@@ -141,12 +146,12 @@ def evaluate(task: Task) -> list[Row]:
     """Rows of one configuration: every objective by every planner."""
     symbols = task.scene.symbols
     bounds = SceneBounds(task.scene, task.bounds)
-    policy = load_policy(task.models)
+    policies = {name: load_policy(task.models, name) for name in POLICIES}
     known = [parse_skeleton(text) for text in task.sequences]
     return [
         row
         for objective in one_goal_objectives(symbols) + two_goal_objectives(symbols)
-        for row in _problem(task, objective, bounds, policy, known)
+        for row in _problem(task, objective, bounds, policies, known)
     ]
 
 
@@ -154,7 +159,7 @@ def _problem(
     task: Task,
     objective: Objective,
     bounds: Bounds,
-    policy: Policy,
+    policies: Mapping[str, Policy],
     known: Sequence[Skeleton],
 ) -> list[Row]:
     shortest = task.shortest[format_objective(objective)]
@@ -167,8 +172,8 @@ def _problem(
     if satisfied(task.scene.state, objective):
         return [problem | {"planner": name, "outcome": "trivial"} for name in PLANNERS]
     results = {
-        name: plan(task.scene, objective, task.scene.symbols, bounds, policy, task.limits)
-        for name, plan in PLANNERS.items()
+        name: plan(task.scene, objective, task.scene.symbols, bounds, policies[policy], task.limits)
+        for name, (policy, plan) in PLANNERS.items()
     }
     found = {len(result.skeleton) for result in results.values() if result.skeleton is not None}
     has_path = None

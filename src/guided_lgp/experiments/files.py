@@ -15,14 +15,14 @@ _KEY = b"guided_lgp"
 
 
 def write_table(path: Path, table: pa.Table) -> None:
-    """Write a Parquet file.
+    """Write a Parquet file, each page with its checksum.
 
     Raises:
         InputError: the file cannot be written.
     """
     stamped = table.replace_schema_metadata({_KEY: _VERSION})
     with written_whole(path) as unfinished:
-        pq.write_table(stamped, unfinished)
+        pq.write_table(stamped, unfinished, write_page_checksum=True)
 
 
 def read_table(path: Path, stage: str, columns: Sequence[str]) -> list[dict[str, Any]]:
@@ -41,10 +41,13 @@ def read_table(path: Path, stage: str, columns: Sequence[str]) -> list[dict[str,
         version = (pq.read_schema(path).metadata or {}).get(_KEY)
         if version != _VERSION:
             raise InputError(str(path), "is of another version", remedy)
-        rows: list[dict[str, Any]] = pq.read_table(path, columns=list(columns)).to_pylist()
+        table = pq.read_table(path, columns=list(columns), page_checksum_verification=True)
+        if missing := set(columns) - set(table.column_names):
+            raise InputError(str(path), f"has no column {min(missing)!r}", remedy)
+        rows: list[dict[str, Any]] = table.to_pylist()
     except InputError:
         raise
-    except (OSError, ValueError, KeyError) as error:
+    except (OSError, ValueError, KeyError, pa.ArrowException) as error:
         fault = "is missing" if isinstance(error, FileNotFoundError) else "cannot be read"
         raise InputError(str(path), fault, remedy) from None
     return rows

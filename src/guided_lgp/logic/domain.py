@@ -81,9 +81,9 @@ def parse_skeleton(text: str) -> Skeleton:
     """Read a skeleton written by :func:`format_skeleton`.
 
     Raises:
-        InputError: one of the actions cannot be read.
+        InputError: one of the actions, or what is between them, cannot be read.
     """
-    return tuple(Action.parse(part) for part in re.findall(r"\([^()]*\)", text))
+    return tuple(Action.parse(part) for part in re.findall(r"\([^()]*\)|[^()\s]+|[()]", text))
 
 
 @dataclass(frozen=True)

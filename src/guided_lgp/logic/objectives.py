@@ -21,6 +21,18 @@ def unsatisfied(state: State, objective: Objective) -> Objective:
     return tuple(goal for goal in objective if not state.satisfies(goal))
 
 
+def least_actions(state: State, objective: Objective) -> int:
+    """A lower bound on the number of actions to an objective: those on its own boxes.
+
+    A box that must be held needs a grasp, one that must stand elsewhere a place, too, unless it is
+    in a gripper already. No action serves two boxes, and a box has one goal.
+    """
+    return sum(
+        1 if goal.kind == "held" or state.holder(goal.box) is not None else 2
+        for goal in unsatisfied(state, objective)
+    )
+
+
 def format_objective(objective: Objective) -> str:
     """Write an objective as one line, readable by :func:`parse_objective`."""
     return " ".join(map(str, objective))

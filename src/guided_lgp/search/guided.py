@@ -39,15 +39,26 @@ class Node:
 
 
 class GuidedTree:
-    """The nodes generated so far; a policy ranks the children of every expanded node."""
+    """The nodes generated so far; a policy ranks the children of every expanded node.
+
+    Raises:
+        InputError: the objective is contradictory, unknown or already satisfied.
+    """
 
     def __init__(
-        self, scene: Scene, objective: Objective, symbols: Symbols, run: Run, adapt: bool
+        self,
+        scene: Scene,
+        objective: Objective,
+        symbols: Symbols,
+        bounds: Bounds,
+        policy: Policy,
+        adapt: bool,
     ) -> None:
-        self.scene = scene
+        validate_objective(objective, symbols, scene.state)
+        self.run = Run(bounds, policy)
+        self._scene = scene
         self._objective = objective
         self._symbols = symbols
-        self._run = run
         self._adapt = adapt
         self.root = Node(0, (), scene.state)
         self.size = 1
@@ -55,6 +66,13 @@ class GuidedTree:
     def satisfied(self, node: Node) -> bool:
         """Whether the goals hold at a node."""
         return satisfied(node.state, self._objective)
+
+    def configuration(self, node: Node) -> Keyframe | None:
+        """x_k = P_coarse(a_1:k)|_k (paper, eq. 3), the arm retreated; None if infeasible."""
+        if not node.skeleton:
+            return start(self._scene)
+        coarse = self.run.coarse(node.skeleton)
+        return coarse.retreated[-1] if coarse.feasible else None
 
     def expand(self, node: Node, configuration: Keyframe) -> list[Node]:
         """Generate the children of a node, most probable first.
@@ -65,8 +83,8 @@ class GuidedTree:
         """
         actions = list(applicable_actions(node.state, self._symbols))
         goals = unsatisfied(node.state, self._objective) if self._adapt else self._objective
-        positions = observe(self.scene, configuration)
-        scores = self._run.log_probabilities(goals, node.state, positions, actions).tolist()
+        positions = observe(self._scene, configuration)
+        scores = self.run.log_probabilities(goals, node.state, positions, actions).tolist()
         best = max(scores)
         children = [
             Node(
@@ -78,7 +96,7 @@ class GuidedTree:
             )
             for number, (action, score) in enumerate(zip(actions, scores, strict=True), self.size)
         ]
-        self._run.expansions += 1
+        self.run.expansions += 1
         self.size += len(children)
         return sorted(children, key=lambda child: -child.log_p)
 
@@ -103,13 +121,12 @@ def plan(
     Raises:
         InputError: the objective is contradictory, unknown or already satisfied.
     """
-    validate_objective(objective, symbols, scene.state)
-    run = Run(bounds, policy)
-    tree = GuidedTree(scene, objective, symbols, run, adapt)
+    tree = GuidedTree(scene, objective, symbols, bounds, policy, adapt)
+    run = tree.run
     unexplored: list[tuple[float, int, Node]] = []
     node = tree.root
     for _ in range(1 + limits.reattempts):
-        cause = _attempt(node, tree, run, unexplored, limits.max_depth)
+        cause = _attempt(node, tree, unexplored, limits.max_depth)
         if cause is None:
             return run.result(tree.size)
         run.attempt_failed(cause)
@@ -122,22 +139,15 @@ def plan(
 
 
 def _attempt(
-    node: Node,
-    tree: GuidedTree,
-    run: Run,
-    unexplored: list[tuple[float, int, Node]],
-    max_depth: int,
+    node: Node, tree: GuidedTree, unexplored: list[tuple[float, int, Node]], max_depth: int
 ) -> Cause | None:
     """Extend a node greedily; None if a verified path satisfies the objective."""
     while True:
-        configuration = start(tree.scene)
-        if node.skeleton:
-            coarse = run.coarse(node.skeleton)
-            if not coarse.feasible:
-                return "infeasible"
-            configuration = coarse.retreated[-1]
+        configuration = tree.configuration(node)
+        if configuration is None:
+            return "infeasible"
         if tree.satisfied(node):
-            return None if run.solve(node.skeleton) else "infeasible"
+            return None if tree.run.solve(node.skeleton) else "infeasible"
         if len(node.skeleton) >= max_depth:
             return "max_depth"
         node, *others = tree.expand(node, configuration)
