@@ -72,9 +72,7 @@ class HierarchicalPolicy:
         return scores
 
 
-def load_policy(
-    directory: Path, name: str = "paper"
-) -> HierarchicalPolicy | RelationalPolicy:
+def load_policy(directory: Path, name: str = "paper") -> HierarchicalPolicy | RelationalPolicy:
     """Read a trained policy; torch is not needed.
 
     Args:
