@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 import yaml
+from typer.main import get_command
 
 from guided_lgp import cli
 from guided_lgp.errors import WorkerError
@@ -69,6 +70,25 @@ def test_every_command_has_help_with_an_example(
         cli.main(words)
     assert ended.value.code in (0, None)
     assert "Example:" in capsys.readouterr().out
+
+
+def options() -> list[tuple[str, Any]]:
+    """Every option and argument of every command, with the command's name."""
+    found, commands = [], [("", get_command(cli.app))]
+    for name, command in commands:
+        found += [(name, option) for option in command.params]
+        commands += getattr(command, "commands", {}).items()
+    return found
+
+
+@pytest.mark.parametrize(
+    "option", [pytest.param(o, id=f"{name} {o.name}".strip()) for name, o in options()]
+)
+def test_every_option_has_help_and_a_default(option: Any) -> None:
+    assert option.help
+    shown = option.show_default if isinstance(option.show_default, str) else option.default
+    assert option.required or shown or "completion" in option.name
+    assert str(ROOT) not in str(shown)
 
 
 def test_heavy_packages_are_not_imported_for_help() -> None:
@@ -212,19 +232,22 @@ def test_plan_writes_actions_and_a_replay(
     assert {"tree_size", "attempts", "time_s"} <= set(plan["statistics"])
 
 
-def test_no_plan_ends_with_1_and_says_why(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    document = yaml.safe_load((ROOT / "params.yaml").read_text())
-    document["compare_scalability"]["max_tree_size"] = 2
-    file = tmp_path / "params.yaml"
-    file.write_text(yaml.safe_dump(document))
+def test_no_plan_ends_with_1_and_says_why(capsys: pytest.CaptureFixture[str]) -> None:
+    scene = str(ROOT / "examples" / "impossible_reach.json")
+    limits = ["--planner", "breadth-first", "--max-nodes", "20", "--json"]
     with pytest.raises(SystemExit) as ended:
-        cli.main([*PLAN, "--params", str(file)])
+        cli.main(["plan", scene, "--goal", "(on red shelf)", *limits])
     assert ended.value.code == 1
     captured = capsys.readouterr()
-    assert captured.out == ""
-    assert captured.err.startswith("no plan: stopped at the limit of the tree size")
+    first, *others, hint = captured.err.splitlines()
+    assert first.startswith("no plan: stopped at the limit of the tree size (2")
+    assert "(place pr2" in first
+    assert all(line.startswith("also infeasible: (grasp") for line in others)
+    assert hint == "hint: --max-nodes raises the limit"
+    answer = json.loads(captured.out)
+    assert answer["solved"] is False
+    assert answer["obstacles"][0]["action"].endswith("red shelf)")
+    assert answer["statistics"]["coarse_sequences"] > 0
 
 
 def test_doctor_says_how_to_mend(capsys: pytest.CaptureFixture[str]) -> None:

@@ -9,7 +9,7 @@ import logging
 import os
 import signal
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
 from enum import StrEnum
@@ -25,7 +25,9 @@ from guided_lgp.paths import MODELS, PARAMS, SOURCES
 
 app = typer.Typer(
     name="guided-lgp",
-    help="Guided sequential manipulation planning with a hierarchical policy.",
+    help="Guided sequential manipulation planning: a policy learned from examples proposes the "
+    "next grasp or placement, and a nonlinear program finds the motion of the robot.",
+    epilog="Example: guided-lgp plan examples/three_boxes.json --goal '(on red green)'",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
@@ -42,12 +44,16 @@ STAGES = {
 }
 """The module of each stage of dvc.yaml; its ``run(params, root)`` does the work."""
 
-mlflow_app = typer.Typer(help="The MLflow dashboard of pipeline runs.", no_args_is_help=True)
+mlflow_app = typer.Typer(
+    help="The MLflow dashboard of pipeline runs.",
+    epilog="Example: guided-lgp mlflow ui",
+    no_args_is_help=True,
+)
 app.add_typer(mlflow_app, name="mlflow")
 
 
 class Network(StrEnum):
-    """The networks of the policy."""
+    """The networks of the hierarchical policy."""
 
     INSTRUCTION = "instruction"
     GRASP = "grasp"
@@ -62,14 +68,35 @@ class Planner(StrEnum):
     BREADTH_FIRST = "breadth-first"
 
 
-AsJson = Annotated[bool, typer.Option("--json", help="Write JSON to standard output.")]
-ParamsFile = Annotated[Path, typer.Option(help="File with the parameters of all stages.")]
+class Policy(StrEnum):
+    """The trained policies."""
+
+    PAPER = "paper"
+    IMPROVED = "improved"
+    RELATIONAL = "relational"
+
+
+_HINTS: Mapping[str | None, str] = {
+    "attempts": "--planner best-first goes on after the last attempt",
+    "stopped": "--max-nodes raises the limit",
+}
+"""What a user can do about the reason for which a search ended."""
+
+AsJson = Annotated[
+    bool,
+    typer.Option("--json", help="Write JSON to standard output.", show_default="text"),
+]
+ParamsFile = Annotated[
+    Path, typer.Option(metavar="FILE", help="YAML file with the parameters of all stages.")
+]
+NetworkName = Annotated[Network, typer.Argument(help="Which of the three networks to train.")]
 
 
 @app.callback()
 def _options(
     debug: Annotated[
-        bool, typer.Option("--debug", help="Show the traceback of an error; before any command.")
+        bool,
+        typer.Option("--debug", help="Show the traceback of an error.", show_default="one line"),
     ] = False,
 ) -> None:
     logging.getLogger("guided_lgp").setLevel(logging.DEBUG if debug else logging.INFO)
@@ -101,35 +128,86 @@ def doctor(as_json: AsJson = False) -> None:
 
 @app.command()
 def plan(
-    scene: Annotated[Path, typer.Argument(help="Scene to plan in, a JSON file.")],
+    scene: Annotated[
+        Path, typer.Argument(metavar="SCENE", help="JSON file with tables and boxes.")
+    ],
     goal: Annotated[
         list[str],
         typer.Option(
-            help='What must hold at the end: "(on BOX TABLE)" or "(held BOX)"; repeatable.'
+            metavar="GOAL",
+            help='What must hold at the end: "(on BOX TABLE)", where TABLE may be another box, or '
+            '"(held BOX)". Once for each goal.',
         ),
     ],
     planner: Annotated[
         Planner,
         typer.Option(
-            help="The paper's search; the same, but complete within its limits; no policy at all."
+            help="How to search. guided: follow the policy, as in the paper; best-first: the "
+            "policy, but going back to any other action where needed; breadth-first: without "
+            "a policy."
         ),
     ] = Planner.GUIDED,
-    out: Annotated[Path | None, typer.Option(help="Write the plan as JSON.")] = None,
+    policy: Annotated[
+        Policy,
+        typer.Option(
+            help="Which trained policy. paper: its networks, for 3 boxes and 2 tables; improved: "
+            "the same networks, better trained; relational: for any number of boxes and tables."
+        ),
+    ] = Policy.PAPER,
+    max_nodes: Annotated[
+        int,
+        typer.Option(min=1, metavar="N", help="Give up when the search tree has N nodes."),
+    ] = 5000,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Write the plan as JSON, with its joint motion in rad and s.",
+            show_default="no file",
+        ),
+    ] = None,
     html: Annotated[
-        Path | None, typer.Option(help="Write the motion as a 3D page for the browser.")
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Write a page that plays the motion in the browser.",
+            show_default="no file",
+        ),
     ] = None,
     execute: Annotated[
-        bool, typer.Option("--execute", help="Carry the plan out under gravity in PyBullet.")
+        bool,
+        typer.Option(
+            "--execute",
+            help="Carry the plan out in a simulation under gravity.",
+            show_default="plan only",
+        ),
     ] = False,
-    models: Annotated[Path, typer.Option(help="Folder with the trained policy.")] = MODELS,
+    models: Annotated[
+        Path,
+        typer.Option(
+            metavar="FOLDER",
+            help="Folder with the trained policies.",
+            show_default="models of the installed clone",
+        ),
+    ] = MODELS,
     params: Annotated[
-        Path, typer.Option(help="File with the limits: sections bounds and compare_scalability.")
+        Path,
+        typer.Option(
+            metavar="FILE",
+            help="YAML file with the limits of the solver and of the search: the sections bounds "
+            "and compare_scalability.",
+            show_default="params.yaml of the installed clone",
+        ),
     ] = SOURCES / PARAMS,
     as_json: AsJson = False,
 ) -> None:
-    """Plan a sequence of actions and its motion; ends with 1 if no plan was found.
+    """Plan a sequence of actions and the motion for it.
+
+    Ends with 0 if a plan was found, with 1 and the reason if not, with 2 for bad input.
 
     Example: guided-lgp plan examples/three_boxes.json --goal "(on red green)" --goal "(held blue)"
+
+    Example: guided-lgp plan scene.json --goal "(on red tray)" --html plan.html --execute
     """
     from guided_lgp.logic import parse_objective
     from guided_lgp.params import load_params
@@ -146,21 +224,28 @@ def plan(
             start,
             objective,
             planner.value,
+            policy=policy.value,
             models=models,
             params=load_params(params),
+            max_nodes=max_nodes,
             where=str(scene),
         )
     times = {name: round(value, 3) for name, value in asdict(result.times).items()}
     statistics = {
         "planner": planner.value,
+        "policy": None if planner is Planner.BREADTH_FIRST else policy.value,
         "tree_size": result.tree_size,
         "attempts": 1 + sum(result.reattempts.values()),
+        "coarse_sequences": result.coarse_calls,
+        "solver_starts": result.solver_starts,
+        "path_sequences": result.path_calls,
         "time_s": times,
     }
     summary = {
         "solved": result.solved,
         "actions": [str(action) for action in result.skeleton or ()],
         "explanation": result.explanation,
+        "obstacles": [obstacle.document() for obstacle in result.obstacles],
         "statistics": statistics,
     }
     path = result.path
@@ -168,6 +253,10 @@ def plan(
         if as_json:
             typer.echo(json.dumps(summary, indent=1))
         typer.echo(f"no plan: {result.explanation}", err=True)
+        for obstacle in result.obstacles[1:3]:
+            typer.echo(f"also infeasible: {obstacle}", err=True)
+        if hint := _HINTS.get(result.reason):
+            typer.echo(f"hint: {hint}", err=True)
         raise typer.Exit(1)
     physics = None
     if execute:
@@ -199,12 +288,22 @@ def plan(
 
 @app.command()
 def view(
-    file: Annotated[Path, typer.Argument(help="Scene, or plan written by plan --out: JSON.")],
-    port: Annotated[int, typer.Option(help="TCP port on 127.0.0.1.", min=1, max=65535)] = 8080,
+    file: Annotated[
+        Path,
+        typer.Argument(metavar="FILE", help="A scene, or a plan written by plan --out, as JSON."),
+    ],
+    port: Annotated[
+        int,
+        typer.Option(
+            metavar="N", help="TCP port on this machine alone (127.0.0.1).", min=1, max=65535
+        ),
+    ] = 8080,
 ) -> None:
-    """Show a scene, or a plan in motion, in the browser of this machine, until interrupted.
+    """Show a scene, or a plan in motion, in the browser until Ctrl-C.
 
     Example: guided-lgp view examples/three_boxes.json
+
+    Example: guided-lgp view plan.json --port 8081
     """
     from guided_lgp.nlp.plan_file import read_plan
     from guided_lgp.report.live import view as serve
@@ -224,7 +323,7 @@ def view(
 
 @app.command("generate_scenes")
 def generate_scenes(params: ParamsFile = PARAMS) -> None:
-    """Draw the configurations for training, test and scalability: data/scenes.
+    """Draw the scenes for training, test and scalability. Writes data/scenes.
 
     Example: guided-lgp generate_scenes
     """
@@ -233,7 +332,7 @@ def generate_scenes(params: ParamsFile = PARAMS) -> None:
 
 @app.command("enumerate_sequences")
 def enumerate_sequences(params: ParamsFile = PARAMS) -> None:
-    """Find every shortest feasible sequence of every configuration: data/sequences.
+    """Find every shortest feasible sequence of actions in every scene. Writes data/sequences.
 
     Example: guided-lgp enumerate_sequences
     """
@@ -242,7 +341,7 @@ def enumerate_sequences(params: ParamsFile = PARAMS) -> None:
 
 @app.command("build_dataset")
 def build_dataset(params: ParamsFile = PARAMS) -> None:
-    """Turn the sequences of the drawn training objectives into samples: data/dataset.
+    """Turn the sequences into samples for training. Writes data/dataset.
 
     Example: guided-lgp build_dataset
     """
@@ -251,10 +350,10 @@ def build_dataset(params: ParamsFile = PARAMS) -> None:
 
 @app.command("train_policy")
 def train_policy(
-    network: Annotated[Network, typer.Argument(help="Which of the three networks.")],
+    network: NetworkName,
     params: ParamsFile = PARAMS,
 ) -> None:
-    """Train one network of the policy: models, reports/training.
+    """Train one network of the paper's policy. Writes models, reports/training.
 
     Example: guided-lgp train_policy place
     """
@@ -263,10 +362,10 @@ def train_policy(
 
 @app.command("train_improved")
 def train_improved(
-    network: Annotated[Network, typer.Argument(help="Which of the three networks.")],
+    network: NetworkName,
     params: ParamsFile = PARAMS,
 ) -> None:
-    """Train one network of the improved policy: models/improved, reports/training/improved.
+    """Train one network of the improved policy. Writes models/improved, reports/training/improved.
 
     Example: guided-lgp train_improved place
     """
@@ -284,7 +383,7 @@ def train_relational(params: ParamsFile = PARAMS) -> None:
 
 @app.command("evaluate_generalization")
 def evaluate_generalization(params: ParamsFile = PARAMS) -> None:
-    """Plan every objective in every test configuration (Table I of the paper).
+    """Plan every objective in every test scene (Table I). Writes reports/metrics.
 
     Example: guided-lgp evaluate_generalization
     """
@@ -293,7 +392,7 @@ def evaluate_generalization(params: ParamsFile = PARAMS) -> None:
 
 @app.command("compare_scalability")
 def compare_scalability(params: ParamsFile = PARAMS) -> None:
-    """Compare the planners on seven problems of growing length (Table III of the paper).
+    """Compare the planners on problems of growing length (Table III). Writes reports/metrics.
 
     Example: guided-lgp compare_scalability
     """
@@ -302,7 +401,7 @@ def compare_scalability(params: ParamsFile = PARAMS) -> None:
 
 @app.command("render_reports")
 def render_reports(params: ParamsFile = PARAMS) -> None:
-    """Write the tables, figures, replays and pages: reports/report.html, reports/report.md.
+    """Draw the tables, figures and replays. Writes reports/report.html, reports/report.md.
 
     Example: guided-lgp render_reports
     """
@@ -311,9 +410,14 @@ def render_reports(params: ParamsFile = PARAMS) -> None:
 
 @mlflow_app.command("ui")
 def mlflow_ui(
-    port: Annotated[int, typer.Option(help="TCP port on 127.0.0.1.", min=1, max=65535)] = 5000,
+    port: Annotated[
+        int,
+        typer.Option(
+            metavar="N", help="TCP port on this machine alone (127.0.0.1).", min=1, max=65535
+        ),
+    ] = 5000,
 ) -> None:
-    """Open the dashboard on http://127.0.0.1:PORT until interrupted.
+    """Serve the dashboard on http://127.0.0.1:5000 until Ctrl-C.
 
     Example: guided-lgp mlflow ui --port 5001
     """
@@ -328,9 +432,9 @@ def mlflow_ui(
 
 @mlflow_app.command("sync")
 def mlflow_sync() -> None:
-    """Record the stages that DVC restored from its cache; what is recorded already stays as it is.
+    """Record the stages that DVC restored from its cache, each once.
 
-    Example: dvc exp apply EXPERIMENT, then: guided-lgp mlflow sync
+    Example: dvc exp apply EXPERIMENT && guided-lgp mlflow sync
     """
     from guided_lgp import tracking
     from guided_lgp.params import load_params

@@ -1,10 +1,12 @@
 """Plan one task: the Python interface behind ``guided-lgp plan``."""
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
 
 from guided_lgp.errors import InputError
+from guided_lgp.explanation import ObservedBounds, Obstacle
 from guided_lgp.logic import Goal, parse_objective, validate_objective
 from guided_lgp.nlp.bounds import SceneBounds
 from guided_lgp.params import Params, load_params
@@ -13,10 +15,33 @@ from guided_lgp.policy.inference import load_policy
 from guided_lgp.scene import Scene
 from guided_lgp.scene.validate import validate_scene
 from guided_lgp.search import best_first, breadth_first, guided
-from guided_lgp.search.result import SearchResult
+from guided_lgp.search.result import REASONS, SearchResult
 
 Planner = Literal["guided", "best-first", "breadth-first"]
 """Guided LGP of the paper, its complete variant, and the breadth-first baseline."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlanningResult(SearchResult):
+    """The plan found, or why there is none, and what the search cost."""
+
+    solver_starts: int
+    """Starts of the coarse bound's solver, over all sequences."""
+    obstacles: tuple[Obstacle, ...] = ()
+    """Without a plan: what stopped the sequences, first what is nearest to the objective."""
+
+    @property
+    def explanation(self) -> str:
+        """One line: why there is no plan and what was tried; empty if there is one."""
+        if self.reason is None:
+            return ""
+        attempts = f"{len(self.causes)} attempts, " if self.causes else ""
+        line = (
+            f"{REASONS[self.reason]} ({self.tree_size} nodes, {attempts}{self.coarse_calls} "
+            f"sequences with {self.solver_starts} starts of the coarse bound, {self.path_calls} of "
+            "them on to the path bound)"
+        )
+        return f"{line}; nearest to the goals: {self.obstacles[0]}" if self.obstacles else line
 
 
 def plan(
@@ -24,26 +49,32 @@ def plan(
     objective: str | Iterable[Goal | str],
     planner: Planner = "guided",
     *,
+    policy: str = "paper",
     models: Path = MODELS,
     params: Params | None = None,
+    max_nodes: int | None = None,
     where: str = "scene",
-) -> SearchResult:
+) -> PlanningResult:
     """Find a sequence of actions and its motion such that all goals hold at the end.
 
     Args:
         scene: robot, tables and boxes, as read by ``load_scene``.
         objective: goals, parsed or as text: ``["(on red green)", "(held blue)"]``.
         planner: ``guided``, ``best-first`` or ``breadth-first``.
-        models: folder with the trained weights; breadth-first needs none.
+        policy: ``paper``, ``improved`` or ``relational``; breadth-first needs none.
+        models: folder with the trained weights.
         params: limits of the bounds and of the search (sections ``bounds`` and
             ``compare_scalability``); the ones of the clone by default.
+        max_nodes: nodes of the search tree at which the search ends, instead of the limit in
+            ``params``.
         where: the scene's file, for messages.
 
     Returns:
-        The result of the search: ``solved``, ``skeleton``, ``path``, or the ``explanation``.
+        The result of the search: ``solved``, ``skeleton``, ``path``; or the ``explanation`` and
+        the ``obstacles``.
 
     Raises:
-        InputError: a fault in the scene, the objective, the planner's name or the models.
+        InputError: a fault in the scene, the objective, the names or the models.
     """
     if planner not in get_args(Planner):
         raise InputError("planner", f"unknown {planner!r}", ", ".join(get_args(Planner)))
@@ -52,8 +83,17 @@ def plan(
     validate_objective(goals, scene.symbols, scene.state)
     params = params or load_params(SOURCES / PARAMS)
     limits = params.compare_scalability
-    bounds = SceneBounds(scene, params.bounds)
+    if max_nodes is not None:
+        limits = limits.model_copy(update={"max_tree_size": max_nodes})
+    bounds = ObservedBounds(SceneBounds(scene, params.bounds))
     if planner == "breadth-first":
-        return breadth_first.plan(scene, goals, scene.symbols, bounds, limits)
-    search = guided.plan if planner == "guided" else best_first.plan
-    return search(scene, goals, scene.symbols, bounds, load_policy(models), limits)
+        result = breadth_first.plan(scene, goals, scene.symbols, bounds, limits)
+    else:
+        search = guided.plan if planner == "guided" else best_first.plan
+        networks = load_policy(models, policy)
+        result = search(scene, goals, scene.symbols, bounds, networks, limits)
+    return PlanningResult(
+        **vars(result),
+        solver_starts=bounds.starts,
+        obstacles=() if result.solved else bounds.obstacles(scene.state, goals),
+    )

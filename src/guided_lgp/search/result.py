@@ -18,12 +18,13 @@ Reason = Literal["stopped", "paths", "exhausted", "attempts"]
 """Why a search ended without a plan: limit of nodes or of paths, nothing left to expand, or no
 reattempt left."""
 
-_REASONS: Mapping[Reason, str] = {
+REASONS: Mapping[Reason, str] = {
     "stopped": "stopped at the limit of the tree size",
     "paths": "stopped at the limit of sequences without a path",
     "exhausted": "every sequence within the depth limit is infeasible",
     "attempts": "the last allowed attempt failed",
 }
+"""In words."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +83,7 @@ class SearchResult:
         """One line: why there is no plan; empty if there is one."""
         if self.reason is None:
             return ""
-        line = f"{_REASONS[self.reason]} ({self.tree_size} nodes)"
+        line = f"{REASONS[self.reason]} ({self.tree_size} nodes)"
         if self.failure is None:
             return line
         return f"{line}; last sequence tried: {format_skeleton(self.failed)}: {self.failure}"

@@ -1,0 +1,107 @@
+"""Why there is no plan: which constraint of which action stopped the sequences of a search."""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from guided_lgp.logic import Action, Objective, Skeleton, State, format_skeleton
+from guided_lgp.logic.domain import progress
+from guided_lgp.nlp.results import CoarseResult, Failure, PathResult
+from guided_lgp.search.bounds import Bounds
+
+
+@dataclass(frozen=True)
+class Obstacle:
+    """A constraint that stopped one or more sequences."""
+
+    bound: str
+    """``coarse``, or ``path`` for a sequence that the coarse bound had let pass."""
+    constraint: str
+    sequences: int
+    """How many sequences it stopped."""
+    example: Skeleton
+    """The shortest of them, up to the action that the constraint belongs to."""
+    violation: float
+    """Of the example, in m or rad; NaN where there is no amount."""
+    tried: str
+    """What was tried for the example, in words."""
+
+    @property
+    def action(self) -> Action:
+        """The action that the constraint belongs to."""
+        return self.example[-1]
+
+    def __str__(self) -> str:
+        failure = Failure(len(self.example) - 1, self.constraint, self.violation, self.tried)
+        return f"{format_skeleton(self.example)}: {failure}"
+
+    def document(self) -> dict[str, object]:
+        """The JSON document of the obstacle."""
+        return {
+            "bound": self.bound,
+            "action": str(self.action),
+            "constraint": self.constraint,
+            "violation": None if math.isnan(self.violation) else self.violation,
+            "sequences": self.sequences,
+            "example": [str(action) for action in self.example],
+            "tried": self.tried,
+        }
+
+
+class ObservedBounds:
+    """The bounds of a scene as one search uses them; keeps what stopped its sequences."""
+
+    def __init__(self, bounds: Bounds) -> None:
+        self._bounds = bounds
+        self._coarse: dict[Skeleton, CoarseResult] = {}
+        self._path: dict[Skeleton, PathResult] = {}
+
+    def coarse(self, skeleton: Skeleton) -> CoarseResult:
+        """See :class:`guided_lgp.search.bounds.Bounds`."""
+        return self._coarse.setdefault(skeleton, self._bounds.coarse(skeleton))
+
+    def path(self, skeleton: Skeleton) -> PathResult:
+        """See :class:`guided_lgp.search.bounds.Bounds`."""
+        return self._path.setdefault(skeleton, self._bounds.path(skeleton))
+
+    @property
+    def starts(self) -> int:
+        """Starts of the coarse solver, over all sequences."""
+        return sum(result.tries for result in self._coarse.values())
+
+    def obstacles(self, start: State, objective: Objective) -> tuple[Obstacle, ...]:
+        """What stopped the sequences; first what is nearest to the objective.
+
+        That is: where most goals hold after the action, by the logic alone; then what the path
+        bound found, which looks at a sequence last; then what stopped most sequences.
+        """
+        groups: dict[tuple[str, Action, str], list[tuple[Skeleton, Failure]]] = {}
+        for bound, skeleton, failure in self._failures():
+            key = bound, skeleton[failure.action], failure.constraint
+            groups.setdefault(key, []).append((skeleton[: failure.action + 1], failure))
+
+        found = []
+        for (bound, _, constraint), members in groups.items():
+            example, failure = min(members, key=lambda member: (len(member[0]), _amount(member[1])))
+            state = progress(start, example)
+            goals = sum(state.satisfies(goal) for goal in objective)
+            order = -goals, bound == "coarse", -len(members), len(example), _amount(failure)
+            found.append(
+                (
+                    order,
+                    Obstacle(
+                        bound, constraint, len(members), example, failure.violation, failure.tried
+                    ),
+                )
+            )
+        return tuple(obstacle for _, obstacle in sorted(found, key=lambda pair: pair[0]))
+
+    def _failures(self) -> Iterable[tuple[str, Skeleton, Failure]]:
+        for bound, results in (("coarse", self._coarse), ("path", self._path)):
+            for skeleton, result in results.items():
+                if result.failure is not None:
+                    yield bound, skeleton, result.failure
+
+
+def _amount(failure: Failure) -> float:
+    return math.inf if math.isnan(failure.violation) else failure.violation

@@ -1,0 +1,139 @@
+"""Planning one task from Python, and what it says where no plan exists."""
+
+import inspect
+import json
+from pathlib import Path
+
+import pytest
+
+from guided_lgp import cli, load_scene, plan
+from guided_lgp.errors import InputError
+from guided_lgp.explanation import ObservedBounds, Obstacle
+from guided_lgp.logic import Action, Skeleton, State, parse_objective
+from guided_lgp.logic.domain import parse_skeleton
+from guided_lgp.nlp.results import CoarseResult, Failure, PathResult
+from guided_lgp.policy.inference import POLICIES
+
+ROOT = Path(__file__).parents[1]
+EXAMPLES = ROOT / "examples"
+START = State.of({"red": "tab1", "green": "tab1"})
+OBJECTIVE = parse_objective(["(on red green)"])
+
+
+class Verdicts:
+    """Bounds that fail where a table says so."""
+
+    def __init__(self, coarse: dict[str, Failure], path: dict[str, Failure]) -> None:
+        self._coarse = {parse_skeleton(text): failure for text, failure in coarse.items()}
+        self._path = {parse_skeleton(text): failure for text, failure in path.items()}
+
+    def coarse(self, skeleton: Skeleton) -> CoarseResult:
+        failure = self._coarse.get(skeleton)
+        return CoarseResult(skeleton, failure is None, failure=failure, tries=3)
+
+    def path(self, skeleton: Skeleton) -> PathResult:
+        failure = self._path.get(skeleton)
+        return PathResult(skeleton, failure is None, failure=failure)
+
+
+def obstacles(
+    coarse: dict[str, Failure], path: dict[str, Failure] | None = None
+) -> tuple[Obstacle, ...]:
+    bounds = ObservedBounds(Verdicts(coarse, path or {}))
+    for text in coarse:
+        assert not bounds.coarse(parse_skeleton(text)).feasible
+    for text in path or {}:
+        assert not bounds.path(parse_skeleton(text)).feasible
+    return bounds.obstacles(START, OBJECTIVE)
+
+
+def test_equal_obstacles_are_counted_and_the_shortest_sequence_is_the_example() -> None:
+    (found,) = obstacles(
+        {
+            "(grasp pr2L green) (grasp pr2R red)": Failure(1, "reach pr2R red", 0.01, "9 starts"),
+            "(grasp pr2R red)": Failure(0, "reach pr2R red", 0.02, "9 starts"),
+        }
+    )
+    assert found.action == Action("grasp", "pr2R", "red")
+    assert (found.sequences, found.example, found.violation) == (2, (found.action,), 0.02)
+    assert str(found) == ("(grasp pr2R red): action 1: reach pr2R red violated by 0.02 (9 starts)")
+
+
+def test_what_is_nearest_to_the_goals_comes_first() -> None:
+    reaching = "(grasp pr2L red) (place pr2L red green)"
+    found = obstacles(
+        {
+            "(grasp pr2R red)": Failure(0, "reach pr2R red", 0.001, ""),
+            "(grasp pr2R red) (place pr2R red green)": Failure(1, "support red green", 0.1, ""),
+        },
+        {reaching: Failure(1, "no motion found to place red", float("nan"), "")},
+    )
+    assert [obstacle.constraint for obstacle in found] == [
+        "no motion found to place red",
+        "support red green",
+        "reach pr2R red",
+    ]
+    assert found[0].bound == "path"
+    assert found[0].document()["violation"] is None
+
+
+def test_a_sequence_asked_twice_counts_once() -> None:
+    bounds = ObservedBounds(Verdicts({"(grasp pr2R red)": Failure(0, "reach", 0.1, "")}, {}))
+    for _ in range(2):
+        bounds.coarse(parse_skeleton("(grasp pr2R red)"))
+    assert bounds.starts == 3
+    assert bounds.obstacles(START, OBJECTIVE)[0].sequences == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "goals", "nodes", "culprits"),
+    [
+        ("impossible_reach", ["(on red shelf)"], 60, {"support red shelf", "reach"}),
+        ("impossible_tower", ["(on red green)", "(on blue red)"], 400, {"reach", "collision"}),
+        ("impossible_pair", ["(on wide1 small)", "(on wide2 small)"], 1000, {"support", "reach"}),
+    ],
+)
+def test_impossible_tasks_name_the_action_the_constraint_and_the_amount(
+    name: str, goals: list[str], nodes: int, culprits: set[str]
+) -> None:
+    scene = load_scene(EXAMPLES / f"{name}.json")
+    result = plan(scene, goals, "breadth-first", max_nodes=nodes)
+    assert not result.solved
+    first = result.obstacles[0]
+    assert first.action.instruction == "place"
+    assert f"(on {first.action.box} {first.action.table})" in goals
+    assert any(first.constraint.startswith(culprit) for culprit in culprits)
+    assert first.violation > 0.001
+    assert str(first) in result.explanation
+    assert f"{result.coarse_calls} sequences with {result.solver_starts} starts" in (
+        result.explanation
+    )
+
+
+def test_a_plan_needs_no_explanation() -> None:
+    result = plan(load_scene(EXAMPLES / "three_boxes.json"), "(held red)", "breadth-first")
+    assert result.solved
+    assert result.explanation == ""
+    assert result.obstacles == ()
+
+
+def test_the_readme_lists_every_scene() -> None:
+    text = (EXAMPLES / "README.md").read_text()
+    for file in EXAMPLES.glob("*.json"):
+        assert f"`{file.name}`" in text
+        assert json.loads(file.read_text())["name"] == file.stem.replace("_", "-")
+
+
+def test_unknown_names() -> None:
+    scene = load_scene(EXAMPLES / "three_boxes.json")
+    with pytest.raises(InputError, match="planner: unknown 'fast'"):
+        plan(scene, "(held red)", "fast")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="policy 'best': is unknown"):
+        plan(scene, "(held red)", policy="best")
+
+
+def test_the_command_line_has_the_defaults_of_the_python_interface() -> None:
+    assert tuple(cli.Policy) == POLICIES
+    command, function = inspect.signature(cli.plan), inspect.signature(plan)
+    for name in ("planner", "policy"):
+        assert command.parameters[name].default == function.parameters[name].default
