@@ -27,7 +27,7 @@ from guided_lgp.logic import (
 )
 from guided_lgp.logic.objectives import all_goals
 from guided_lgp.logic.strips import facts, goal_facts, relaxed_operators
-from guided_lgp.search.landmark_cut import landmark_cut
+from guided_lgp.search.landmark_cut import LandmarkCut
 from guided_lgp.search.tree import StateSpace, distances
 
 GRIPPERS = ("pr2L", "pr2R")
@@ -95,7 +95,7 @@ def test_minimal_lengths_and_plans(symbols: Symbols, tmp_path: Path) -> None:
         space.explore()
         to_go = distances(space, objective)
         assert len(oracle) == to_go[0]
-        assert landmark_cut(facts(state, symbols), goal_facts(objective), operators) <= to_go[0]
+        assert LandmarkCut(goal_facts(objective), operators)(facts(state, symbols)) <= to_go[0]
 
         theirs = [pddl.action(operator.name, symbols) for operator in oracle]
         assert satisfied(progress(state, theirs), objective)

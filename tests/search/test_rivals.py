@@ -18,7 +18,7 @@ from guided_lgp.logic.strips import facts, goal_facts, relaxed_operators
 from guided_lgp.params import SearchLimits
 from guided_lgp.scene.model import Scene
 from guided_lgp.search import classical, graph
-from guided_lgp.search.landmark_cut import landmark_cut
+from guided_lgp.search.landmark_cut import LandmarkCut
 from guided_lgp.search.result import SearchResult
 from guided_lgp.search.tree import StateSpace, distances
 
@@ -84,14 +84,13 @@ def test_landmark_cut_is_admissible_and_informed() -> None:
     symbols = scene.symbols
     space = StateSpace(symbols, scene.state)
     space.explore()
-    operators = relaxed_operators(symbols)
     objectives: list[Objective] = [TOWER, *two_goal_objectives(symbols)[::7]]
     informed = 0
     for objective in objectives:
         exact = distances(space, objective)
-        goals = goal_facts(objective)
+        landmark_cut = LandmarkCut(goal_facts(objective), relaxed_operators(symbols))
         for number, state in enumerate(space.states):
-            bound = landmark_cut(facts(state, symbols), goals, operators)
+            bound = landmark_cut(facts(state, symbols))
             assert least_actions(state, objective) <= exact[number]
             assert bound <= exact[number]
             assert (bound == 0) == (exact[number] == 0)

@@ -2,12 +2,12 @@
 
 from heapq import heappop, heappush
 
-from guided_lgp.logic import Objective, Skeleton, Symbols, validate_objective
+from guided_lgp.logic import Objective, Symbols, validate_objective
 from guided_lgp.logic.strips import facts, goal_facts, relaxed_operators
 from guided_lgp.params import SearchLimits
 from guided_lgp.scene import Scene
 from guided_lgp.search.bounds import Bounds
-from guided_lgp.search.landmark_cut import landmark_cut
+from guided_lgp.search.landmark_cut import LandmarkCut
 from guided_lgp.search.result import Run, SearchResult
 from guided_lgp.search.tree import GoalStates, LogicTree
 
@@ -15,12 +15,12 @@ from guided_lgp.search.tree import GoalStates, LogicTree
 def plan(
     scene: Scene, objective: Objective, symbols: Symbols, bounds: Bounds, limits: SearchLimits
 ) -> SearchResult:
-    """A* over the logic tree: sequences in order of length until one is feasible.
+    """A* over the logic tree: the first sequence found feasible is one of the shortest.
 
     The heuristic is landmark-cut, computed once per symbolic state. Equal states are not merged,
-    because the first sequence to a state may be geometrically infeasible; in exchange, everything
-    that begins with a sequence that a bound has rejected is left out. Equal estimates: nearer to
-    the goal first, then older first.
+    because the first sequence to a state may be geometrically infeasible; in exchange, a sequence
+    whose coarse bound is infeasible is pruned when its turn comes, with all that begins with it.
+    Equal estimates: nearer to the goal first, then older first.
 
     Raises:
         InputError: the objective is contradictory, unknown or already satisfied.
@@ -30,19 +30,17 @@ def plan(
     tree = LogicTree(symbols, scene.state)
     goals = GoalStates(tree.space, objective)
     estimate = _Heuristic(tree, symbols, objective)
-    rejected: set[Skeleton] = set()
     frontier = [(estimate(0), estimate(0), 0, 0)]
     while frontier:
         if limit := run.limit_reached(len(tree), limits):
             return run.result(len(tree), limit)
         _, _, node, depth = heappop(frontier)
-        if rejected and _begins_with(tree.skeleton(node), rejected):
+        skeleton = tree.skeleton(node)
+        if skeleton and not run.coarse(skeleton).feasible:
             continue
         if tree.state[node] in goals:
-            skeleton = tree.skeleton(node)
             if run.solve(skeleton):
                 return run.result(len(tree))
-            rejected.add(run.failed)
             continue
         run.expansions += 1
         for child in tree.expand(node):
@@ -52,23 +50,18 @@ def plan(
     return run.result(len(tree), "exhausted")
 
 
-def _begins_with(skeleton: Skeleton, rejected: set[Skeleton]) -> bool:
-    return any(skeleton[:length] in rejected for length in range(1, len(skeleton) + 1))
-
-
 class _Heuristic:
     """Landmark-cut of the states of a tree, each computed once."""
 
     def __init__(self, tree: LogicTree, symbols: Symbols, objective: Objective) -> None:
         self._states = tree.space.states
         self._symbols = symbols
-        self._operators = relaxed_operators(symbols)
-        self._goals = goal_facts(objective)
+        self._landmark_cut = LandmarkCut(goal_facts(objective), relaxed_operators(symbols))
         self._known: dict[int, float] = {}
 
     def __call__(self, state: int) -> float:
         value = self._known.get(state)
         if value is None:
             start = facts(self._states[state], self._symbols)
-            value = self._known[state] = landmark_cut(start, self._goals, self._operators)
+            value = self._known[state] = self._landmark_cut(start)
         return value
