@@ -91,43 +91,15 @@ def train_network(
     Raises:
         InputError: too few samples to split, or a training that diverges at once.
     """
-    own: Network = getattr(settings, network)
-    samples = dataset.of_network(network)
-    tasks = [
-        _Task(
-            network=network,
-            sub_policy=sub_policy,
-            split=split,
-            dataset=dataset,
-            validation=validation_samples(dataset, split, settings),
-            settings=own,
-            patience=settings.patience,
-            seed=np.random.SeedSequence([settings.seed, list(CHAINS).index(network), index]),
-        )
-        for split in SPLITS
-        for index, sub_policy in enumerate(CHAINS[network])
-    ]
-    for task in tasks:
-        held_out = np.count_nonzero(task.validation[samples])
-        if not 0 < held_out < len(samples):
-            raise InputError(
-                "train_policy.validation_share",
-                f"{held_out} of {len(samples)} samples of the network {network} for validation "
-                f"(split: {task.split})",
-                "a share that leaves samples on both sides; or more configurations",
-            )
+    tasks = [task for split in SPLITS for task in _tasks(network, dataset, settings, split)]
     fits = run(_train, tasks, parallel, f"training {network}")
     results = {(task.split, task.sub_policy): f for task, f in zip(tasks, fits, strict=True)}
-    Model(
-        network=network,
-        encoding=dataset.encoding,
-        sub_policies={name: results["random", name].layers for name in CHAINS[network]},
-        training={"seed": settings.seed, "samples": len(samples), **own.model_dump()},
-    ).save(directory)
+    model = _model(network, dataset, settings, {n: results["random", n] for n in CHAINS[network]})
+    model.save(directory)
     return TrainingReport(
         network=network,
         seed=settings.seed,
-        samples=len(samples),
+        samples=len(dataset.of_network(network)),
         sub_policies={
             name: {
                 "classes": dataset.class_names(name),
@@ -136,6 +108,61 @@ def train_network(
             }
             for name in CHAINS[network]
         },
+    )
+
+
+def train_models(dataset: Dataset, settings: TrainPolicy, split: str) -> dict[str, Model]:
+    """All networks, one after another in this process; for studies, which train many policies.
+
+    Args:
+        dataset: the training samples.
+        settings: of training.
+        split: the one of :data:`SPLITS` that decides about the weights.
+
+    Raises:
+        InputError: too few samples to split, or a training that diverges at once.
+    """
+    models = {}
+    for network in CHAINS:
+        tasks = _tasks(network, dataset, settings, split)
+        fits = {task.sub_policy: _train(task) for task in tasks}
+        models[network] = _model(network, dataset, settings, fits)
+    return models
+
+
+def _tasks(network: str, dataset: Dataset, settings: TrainPolicy, split: str) -> list[_Task]:
+    validation = validation_samples(dataset, split, settings)
+    held_out = validation[dataset.of_network(network)]
+    if held_out.all() or not held_out.any():
+        raise InputError(
+            "train_policy.validation_share",
+            f"{np.count_nonzero(held_out)} of {len(held_out)} samples of the network {network} "
+            f"for validation (split: {split})",
+            "a share that leaves samples on both sides; or more configurations",
+        )
+    return [
+        _Task(
+            network=network,
+            sub_policy=sub_policy,
+            split=split,
+            dataset=dataset,
+            validation=validation,
+            settings=getattr(settings, network),
+            patience=settings.patience,
+            seed=np.random.SeedSequence([settings.seed, list(CHAINS).index(network), index]),
+        )
+        for index, sub_policy in enumerate(CHAINS[network])
+    ]
+
+
+def _model(network: str, dataset: Dataset, settings: TrainPolicy, fits: Mapping[str, Fit]) -> Model:
+    own: Network = getattr(settings, network)
+    samples = len(dataset.of_network(network))
+    return Model(
+        network=network,
+        encoding=dataset.encoding,
+        sub_policies={name: fits[name].layers for name in CHAINS[network]},
+        training={"seed": settings.seed, "samples": samples, **own.model_dump()},
     )
 
 
