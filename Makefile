@@ -8,7 +8,7 @@ INSTALLED := $(VENV)/.installed
 export PATH := $(BIN):$(PATH)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: setup repro test lint bench mlflow verify-determinism
+.PHONY: setup repro test lint bench mlflow verify-determinism verify-interruption
 
 setup: $(INSTALLED)
 
@@ -41,9 +41,13 @@ bench: setup
 	dvc repro -q generate_scenes
 	python benchmarks/run.py
 
-# The small profile with one worker and with two, compared byte by byte.
+# The small profile with one worker, with two and on Dask, compared byte by byte.
 verify-determinism: setup
 	python tests/determinism.py
+
+# The small profile with every process killed at random moments, against an undisturbed run.
+verify-interruption: setup
+	python tests/interruption.py
 
 mlflow: setup
 	guided-lgp mlflow ui

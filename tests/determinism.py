@@ -1,7 +1,8 @@
 """Same seed, same bytes, whatever the number of workers: the check of `make verify-determinism`.
 
-Runs the small profile of the commit at HEAD in two fresh clones, with one worker and with two, and
-compares every file that it writes. Ends with 1 if any differs; the clones are then kept.
+Runs the small profile of the commit at HEAD in three fresh clones, with one worker, with two and on
+a Dask cluster, and compares every file that it writes. Ends with 1 if any differs; the clones are
+then kept.
 """
 
 import os
@@ -24,11 +25,11 @@ TIMING = Path("reports/metrics/scalability_timing.json")
 class Clone:
     """A clone of the repository with the small profile and without any results."""
 
-    def __init__(self, folder: Path, workers: int) -> None:
+    def __init__(self, folder: Path, workers: int, backend: str = "loky") -> None:
         self.folder = folder
         subprocess.run(["git", "clone", "-q", str(ROOT), str(folder)], check=True)
         params = yaml.safe_load((folder / "tests" / "params.yaml").read_text())
-        params["parallel"]["workers"] = workers
+        params["parallel"] = {"backend": backend, "workers": workers}
         (folder / "params.yaml").write_text(yaml.safe_dump(params, sort_keys=False))
         (folder / "dvc.lock").unlink()
         for name in OUTPUTS:
@@ -36,15 +37,29 @@ class Clone:
 
     def run(self, *command: str) -> None:
         """Run a command with the packages of this environment, but the sources of the clone."""
+        subprocess.run(command, cwd=self.folder, env=self._environment(), check=True)
+
+    def start(self, *command: str, log: Path) -> subprocess.Popen[bytes]:
+        """Start a command in a process group of its own."""
+        with log.open("wb") as stream:
+            return subprocess.Popen(
+                command,
+                cwd=self.folder,
+                env=self._environment(),
+                stdin=subprocess.DEVNULL,
+                stdout=stream,
+                stderr=stream,
+                start_new_session=True,
+            )
+
+    def _environment(self) -> dict[str, str]:
         kept = {name: os.environ[name] for name in os.environ if not name.startswith("DVC_")}
-        path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-        own = {
-            "PATH": path,
+        return kept | {
+            "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
             "PYTHONPATH": str(self.folder / "src"),
             "XDG_CACHE_HOME": str(self.folder / ".cache"),
             "MLFLOW_TRACKING_URI": f"sqlite:///{self.folder / 'mlflow.db'}",
         }
-        subprocess.run(command, cwd=self.folder, env=kept | own, check=True)
 
     def check_sources(self) -> None:
         """Make sure that the clone runs its own sources, not those that are installed."""
@@ -84,22 +99,25 @@ def differences(first: Path, second: Path) -> Iterator[str]:
             writer = second if contents[0] is None else first
             yield f"{file}: written in {writer.name} only"
         elif contents[0] != contents[1]:
-            yield f"{file}: differs"
+            yield f"{file}: differs in {second.name}"
 
 
 def main() -> int:
     """Run, compare, report."""
     parent = Path(mkdtemp(prefix="determinism-"))
-    clones = [Clone(parent / f"workers-{workers}", workers) for workers in (1, 2)]
-    for clone in clones:
+    first = Clone(parent / "loky-1", 1)
+    others = [Clone(parent / "loky-2", 2), Clone(parent / "dask-2", 2, "dask")]
+    for clone in (first, *others):
         clone.check_sources()
         clone.repro()
-    first, second = (clone.folder for clone in clones)
-    render_with_times_of(first, clones[1])
-    found = list(differences(first, second))
+    found = []
+    for clone in others:
+        render_with_times_of(first.folder, clone)
+        found += differences(first.folder, clone.folder)
     for line in found:
         print(line)
-    print(f"{len(outputs(first))} files compared (not {TIMING}), {len(found)} differences")
+    count = len(outputs(first.folder))
+    print(f"{count} files of 3 runs compared (not {TIMING}), {len(found)} differences")
     if found:
         print(f"the clones are kept in {parent}")
         return 1

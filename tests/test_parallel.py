@@ -3,6 +3,7 @@
 import logging
 import os
 import pickle
+import resource
 import signal
 import subprocess
 import sys
@@ -10,8 +11,12 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import dask
+import numpy as np
 import psutil
 import pytest
+from dask.distributed import LocalCluster
+from numpy.typing import NDArray
 
 from guided_lgp import parallel
 from guided_lgp.errors import InputError, WorkerError
@@ -47,6 +52,27 @@ def bad_input(_: int) -> int:
 
 def die(_: int) -> int:
     os._exit(1)
+
+
+def total(array: NDArray[np.int64]) -> int:
+    assert not isinstance(array, np.memmap)
+    return int(array.sum())
+
+
+def exhaust_memory(_: int) -> int:
+    before = resource.getrlimit(resource.RLIMIT_AS)
+    resource.setrlimit(resource.RLIMIT_AS, (2**33, before[1]))
+    try:
+        return len(bytearray(2**34))
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, before)
+
+
+def announce(folder: Path) -> int:
+    """Leave a file named by the process, and take a while."""
+    (folder / f"{os.getpid()}").touch()
+    time.sleep(0.5)
+    return len(folder.name)
 
 
 def keep_busy(folder: Path) -> None:
@@ -143,6 +169,19 @@ def test_a_killed_worker_is_reported() -> None:
         run(die, range(2), TWO, "solve")
 
 
+def test_a_worker_without_memory_is_reported() -> None:
+    with pytest.raises(WorkerError, match=r"solve: task \d of 2 failed: MemoryError$"):
+        run(exhaust_memory, range(2), TWO, "solve")
+
+
+def test_large_arguments_leave_no_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A worker gets arrays of many megabytes through its pipe: nothing is left after a kill."""
+    monkeypatch.setenv("JOBLIB_TEMP_FOLDER", str(tmp_path))
+    arrays = [np.full(10**6, number) for number in range(3)]
+    assert run(total, arrays, TWO, "sum") == [0, 10**6, 2 * 10**6]
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 @pytest.mark.parametrize("backend", ["loky", "dask"])
 def test_workers_end_with_the_process_that_started_them(
@@ -176,8 +215,66 @@ def test_dask_gives_the_same_results(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("DASK_SCHEDULER_ADDRESS", raising=False)
     settings = Parallel(backend="dask", workers=2)
     assert run(square, range(7), settings, "squares") == run(square, range(7), TWO, "squares")
-    with pytest.raises(WorkerError, match="task 3 of 4 failed"):
+
+
+def test_a_task_that_kills_dask_workers_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("DASK_SCHEDULER_ADDRESS", raising=False)
+    with (
+        dask.config.set({"distributed.scheduler.allowed-failures": 0}),
+        pytest.raises(WorkerError, match="a worker process was killed"),
+    ):
+        run(die, range(2), Parallel(backend="dask", workers=1), "solve")
+
+
+@pytest.fixture
+def machines(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[subprocess.Popen[bytes]]]:
+    """Two Dask workers that nobody restarts, as on two machines, and their scheduler."""
+    words = [sys.executable, "-m", "distributed.cli.dask_worker", "--no-nanny", "--no-dashboard"]
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parent)}
+    with LocalCluster(n_workers=0, dashboard_address=None) as cluster:
+        command = [*words, "--nthreads", "1", cluster.scheduler_address]
+        workers = [
+            subprocess.Popen(command, env=environment, stderr=subprocess.DEVNULL) for _ in range(2)
+        ]
+        monkeypatch.setenv("DASK_SCHEDULER_ADDRESS", cluster.scheduler_address)
+        wait_until(lambda: len(cluster.scheduler_info["workers"]) == 2, 60)
+        yield workers
+        for worker in workers:
+            worker.kill()
+            worker.wait()
+
+
+def test_a_dask_cluster_behaves_like_the_workers_of_one_machine(
+    machines: list[subprocess.Popen[bytes]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings = Parallel(backend="dask", workers=1)
+    for ahead in (parallel.AHEAD, 2):
+        monkeypatch.setattr(parallel, "AHEAD", ahead)
+        assert run(slow_first, range(5), settings, "sleep") == list(range(5))
+    assert run(square, [], settings, "nothing") == []
+    with pytest.raises(WorkerError, match="enumerate: task 3 of 4 failed: ZeroDivisionError"):
         run(fail_at_two, range(4), settings, "enumerate")
+    with pytest.raises(InputError, match="floats 2 cm above tab1"):
+        run(bad_input, range(3), settings, "check")
+    results = stream(square, range(100), settings, "squares")
+    assert [next(results) for _ in range(3)] == [0, 1, 4]
+    results.close()  # type: ignore[attr-defined]
+
+
+def test_a_dask_cluster_goes_on_without_a_worker_and_ends_without_any(
+    machines: list[subprocess.Popen[bytes]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings = Parallel(backend="dask", workers=1)
+    results = stream(announce, 10 * [tmp_path], settings, "announce")
+    assert next(results) == len(tmp_path.name)
+    wait_until(lambda: len(list(tmp_path.iterdir())) == 2, 30)
+    machines[0].kill()
+    assert list(results) == 9 * [len(tmp_path.name)]
+
+    monkeypatch.setattr(parallel, "WORKERLESS_S", 1.0)
+    machines[1].kill()
+    with pytest.raises(WorkerError, match="announce: no Dask worker for 1 s"):
+        run(announce, 2 * [tmp_path], settings, "announce")
 
 
 def test_dask_without_its_extra_is_bad_input(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -77,7 +77,7 @@ def test_a_changed_and_a_missing_output_are_differences(tmp_path: Path) -> None:
     assert list(differences(*folders)) == []
     (folders[1] / "data" / "changed").write_text("otherwise")
     (folders[0] / "data" / "new").touch()
-    expected = ["data/changed: differs", "data/new: written in one only"]
+    expected = ["data/changed: differs in two", "data/new: written in one only"]
     assert list(differences(*folders)) == expected
 
 

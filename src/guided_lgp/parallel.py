@@ -6,8 +6,9 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, closing, contextmanager
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import closing, contextmanager
+from itertools import islice
 from typing import Any, TypeVar
 
 from guided_lgp.errors import InputError, WorkerError
@@ -23,7 +24,17 @@ MILESTONES = 10
 WATCH_S = 0.5
 """Time between two looks at whether the parent process is there."""
 
+WORKERLESS_S = 120.0
+"""How long tasks wait for a Dask worker where there is none."""
+LOOK_S = 0.01
+"""Time between two looks at whether a Dask task has finished."""
+AHEAD = 10_000
+"""Tasks that a Dask scheduler is given at a time: more than workers, and few enough to keep."""
+
 logger = logging.getLogger(__name__)
+
+_Arguments = tuple[Callable[..., Any], Any, str]
+_KILLED = "{}: a worker process was killed, most often for lack of memory"
 
 
 def run(
@@ -55,45 +66,81 @@ def stream(
     description: str,
 ) -> Iterator[Result]:
     """Like :func:`run`, but each result is available as soon as all before it are."""
-    with ExitStack() as stack:
-        advance = stack.enter_context(progress(len(tasks), description))
-        for result in _results(function, tasks, settings, description, stack):
+    calls = (
+        (function, task, f"{description}: task {number} of {len(tasks)}")
+        for number, task in enumerate(tasks, 1)
+    )
+    on = _on_dask if settings.backend == "dask" else _on_loky
+    workers = min(settings.workers, max(len(tasks), 1))
+    with (
+        progress(len(tasks), description) as advance,
+        closing(on(calls, workers, description)) as results,
+    ):
+        for result in results:
             advance()
             yield result
 
 
-def _results(
-    function: Callable[[Task], Result],
-    tasks: Sequence[Task],
-    settings: Parallel,
-    description: str,
-    stack: ExitStack,
-) -> Iterator[Result]:
+def _on_loky(
+    calls: Iterator[_Arguments], workers: int, description: str
+) -> Generator[Any, None, None]:
     import joblib
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 
-    workers = min(settings.workers, max(len(tasks), 1))
-    backend: dict[str, Any] = {
-        "backend": "loky",
-        "inner_max_num_threads": 1,
-        "initializer": end_with_parent,
-        "initargs": (os.getpid(), signal.SIGKILL),
-    }
-    if settings.backend == "dask":
-        stack.enter_context(_dask_client(workers))
-        backend, workers = {"backend": "dask"}, -1
-    with joblib.parallel_config(**backend):
+    with joblib.parallel_config(
+        "loky",
+        max_nbytes=None,  # arrays go through pipes: files of them would outlive a kill
+        inner_max_num_threads=1,
+        initializer=end_with_parent,
+        initargs=(os.getpid(), signal.SIGKILL),
+    ):
         pool = joblib.Parallel(n_jobs=workers, return_as="generator")
-    labels = (
-        f"{description}: task {number} of {len(tasks)}" for number in range(1, len(tasks) + 1)
-    )
-    calls = (joblib.delayed(_call)(function, *pair) for pair in zip(tasks, labels, strict=True))
     try:
-        yield from stack.enter_context(closing(pool(calls)))
+        with closing(pool(joblib.delayed(_call)(*call) for call in calls)) as results:
+            yield from results
     except TerminatedWorkerError as error:
-        raise WorkerError(
-            f"{description}: a worker process was killed, most often for lack of memory"
-        ) from error
+        raise WorkerError(_KILLED.format(description)) from error
+
+
+def _on_dask(
+    calls: Iterator[_Arguments], workers: int, description: str
+) -> Generator[Any, None, None]:
+    """Results in order. Not through joblib, which waits for ever for a task that kills workers."""
+    with _dask_client(workers) as client:
+        from dask.distributed import CancelledError, KilledWorker, as_completed
+
+        finished = as_completed(loop=client.loop)
+        numbers: dict[Any, int] = {}
+        results: dict[int, Any] = {}
+        submitted = yielded = 0
+        try:
+            while True:
+                for call in islice(calls, AHEAD - len(numbers)):
+                    future = client.submit(_call, *call, pure=False)
+                    numbers[future] = submitted
+                    submitted += 1
+                    finished.add(future)
+                if not numbers:
+                    return
+                _await(finished, client, description)
+                future = next(finished)
+                results[numbers.pop(future)] = future.result()
+                while yielded in results:
+                    yield results.pop(yielded)
+                    yielded += 1
+        except (KilledWorker, CancelledError) as error:
+            raise WorkerError(_KILLED.format(description)) from error
+
+
+def _await(finished: Any, client: Any, description: str) -> None:
+    """Return when a task has finished; give up where there are no workers for long."""
+    last = time.monotonic()
+    while not finished.has_ready():
+        if client.scheduler_info()["workers"]:
+            last = time.monotonic()
+        elif time.monotonic() - last > WORKERLESS_S:
+            raise WorkerError(f"{description}: no Dask worker for {WORKERLESS_S:.0f} s")
+        time.sleep(LOOK_S)
 
 
 def end_with_parent(parent: int, number: signal.Signals) -> None:
@@ -121,7 +168,8 @@ def _call(function: Callable[[Task], Result], task: Task, label: str) -> Result:
     except InputError:
         raise
     except Exception as error:
-        raise WorkerError(f"{label} failed: {type(error).__name__}: {error}") from error
+        reason = ": ".join(filter(None, (type(error).__name__, str(error))))
+        raise WorkerError(f"{label} failed: {reason}") from error
 
 
 def _dask_client(workers: int) -> Any:
