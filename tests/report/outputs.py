@@ -38,6 +38,7 @@ TREE: dict[str, tuple[float | None, ...]] = {
 """Tree size by planner, in the order of the problems; None: stopped at the limit."""
 
 CLASSES = {
+    "action": ("grasp", "place"),
     "instruction": ("grasp", "place"),
     "gripper": ("pr2L", "pr2R"),
     "box": ("red", "green", "blue"),
@@ -63,7 +64,7 @@ def write_outputs(root: Path) -> None:
     chains = {f"{network}.json": chain for network, chain in CHAINS.items()}
     chains |= {f"improved/{file}": chain for file, chain in chains.items()}
     for file, chain in (chains | {"relational.json": ("action",)}).items():
-        sub_policies = {name: _training(CLASSES.get(name), rng) for name in chain}
+        sub_policies = {name: _training(CLASSES[name], rng) for name in chain}
         report = {"version": 1, "seed": 5, "samples": 1000, "sub_policies": sub_policies}
         write_json(root / TRAINING / file, report)
 
@@ -169,7 +170,6 @@ def _write_scalability(root: Path, scenes: Any) -> None:
                     "solved": size is not None,
                     "reason": "stopped" if size is None else None,
                     "skeleton": "(grasp pr2L red) (place pr2L red tab1)" if size else None,
-                    "policy_calls": problem.k_min,
                 }
                 for scene in kept
                 for objective in objectives
@@ -184,6 +184,8 @@ def _write_scalability(root: Path, scenes: Any) -> None:
                 "tree_size_mean": size or 12345.0,
                 "tree_size_std": 0.1 * (size or 12345.0),
                 "plan_length_mean": float(problem.k_min),
+                **{f"{part}_calls_mean": 1.1 * problem.k_min for part in ("policy", "coarse")},
+                "path_calls_mean": 1.0,
             }
             total = 0.5 + 1e-3 * (size or 12345.0)
             parts = ("time_mean_s", "time_std_s", "symbolic_s", "policy_s", "coarse_s", "path_s")
@@ -196,7 +198,7 @@ def _write_scalability(root: Path, scenes: Any) -> None:
     write_json(root / METRICS / "scalability_timing.json", timing)
 
 
-def _training(classes: tuple[str, ...] | None, rng: np.random.Generator) -> dict[str, Any]:
+def _training(classes: tuple[str, ...], rng: np.random.Generator) -> dict[str, Any]:
     epochs = np.arange(1, 61)
     curves = {
         "training_loss": (0.3 + epochs**-0.3).tolist(),
@@ -209,13 +211,10 @@ def _training(classes: tuple[str, ...] | None, rng: np.random.Generator) -> dict
         "loss": curves["validation_loss"][-1],
         "epochs": 60,
         "best_epoch": 60,
+        "confusion": rng.integers(0, 500, (len(classes), len(classes))).tolist(),
         "curves": curves,
     }
-    trained = {**figures, "by_configuration": figures}
-    if classes is not None:
-        confusion = rng.integers(0, 500, (len(classes), len(classes))).tolist()
-        trained |= {"classes": classes, "confusion": confusion}
-    return trained
+    return {"classes": classes, **figures, "by_configuration": figures}
 
 
 class Bounds:

@@ -114,7 +114,3 @@ def test_policy_calls_count_solved_problems_only() -> None:
         {"planner": "default", "length": [4, None, 2], "policy_calls": [6, 90, 2]}
     )
     assert analysis.calls_per_action(problems) == {"default": 1.25}
-    runs = pd.DataFrame({"problem": "a.1", "planner": "guided"}, index=range(2)).assign(
-        solved=[True, False], policy_calls=[5, 90]
-    )
-    assert analysis.policy_calls(runs) == {("a.1", "guided"): 5.0}

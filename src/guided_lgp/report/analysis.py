@@ -117,17 +117,6 @@ def calls_per_action(problems: pd.DataFrame) -> dict[str, float]:
     }
 
 
-def policy_calls(runs: pd.DataFrame) -> dict[tuple[str, str], float]:
-    """Mean number of policy calls by problem and planner, over the problems solved.
-
-    Args:
-        runs: columns problem, planner, solved and policy_calls.
-    """
-    solved = runs[runs["solved"].astype(bool)]
-    means: Any = solved.groupby(["problem", "planner"])["policy_calls"].mean()
-    return {key: float(mean) for key, mean in means.items()}
-
-
 def by_length(verdicts: pd.DataFrame) -> list[dict[str, Any]]:
     """Sequences tried and the share infeasible: keys split, length, n, infeasible_share."""
     groups: Any = verdicts.groupby(["split", "length"])["feasible"]

@@ -1,7 +1,6 @@
 """The report's sections: which table and which figure stands where, and what is said about it."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 from guided_lgp.params import Params
 from guided_lgp.report import findings
@@ -36,21 +35,11 @@ DIFFERENCES = (
 """Where this work departs from the paper, or had to choose."""
 
 
-@dataclass(frozen=True)
-class Calls:
-    """How often policies were asked, over the problems solved."""
-
-    per_action: Mapping[str, float]
-    """By planner of the test of generalization: mean number of calls per action of the plan."""
-    by_problem: Mapping[tuple[str, str], float]
-    """By problem and planner of the test of scalability: mean number of calls."""
-
-
 def compose(
     inputs: Inputs,
     params: Params,
     novelty: Mapping[str, str],
-    calls: Calls,
+    calls: Mapping[str, float],
     tables: Mapping[str, Table],
     replays: Sequence[tuple[str, str]],
     studies: str | None,
@@ -61,13 +50,13 @@ def compose(
         inputs: for the sentences and the pictures of the setups.
         params: for the seeds.
         novelty: of every objective.
-        calls: for the sentences.
+        calls: by planner, mean number of policy calls per action of the plan.
         tables: by name.
         replays: (address, text) of every replay.
         studies: address of the studies' page, if they were made.
     """
     generalization: list[Block] = [
-        Bullets(findings.generalization(inputs.generalization, calls.per_action)),
+        Bullets(findings.generalization(inputs.generalization, calls)),
         tables["table_1"],
         findings.unseen(novelty),
         tables["unseen"],
@@ -89,7 +78,7 @@ def compose(
             "apart. Dashed: greedy; solid: best-first and planners without a policy. Open markers: "
             "the paper's means. Crosses: stopped at the limit of the tree size (dotted).",
         ),
-        Bullets(findings.scalability(inputs.scalability, inputs.timing, calls.by_problem)),
+        Bullets(findings.scalability(inputs.scalability, inputs.timing)),
         tables["table_3_tree_size"],
         tables["table_3_time"],
         Picture(

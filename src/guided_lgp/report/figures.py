@@ -343,19 +343,22 @@ def confusion(matrices: Mapping[str, Mapping[str, tuple[Sequence[str], np.ndarra
     """Confusion of every sub-policy: rows the action of the data, columns the one predicted.
 
     Args:
-        matrices: by policy and name of the sub-policy, labels and counts; the same sub-policies
-            for every policy.
+        matrices: by policy and name of the sub-policy, labels and counts.
     """
-    sizes = [len(labels) for labels, _ in next(iter(matrices.values())).values()]
+    columns = max(matrices.values(), key=len)
+    sizes = [len(labels) + 0.5 for labels, _ in columns.values()]
     figure, axes = _subplots(
-        len(matrices), len(sizes), PAGE, 2.1 * len(matrices), width_ratios=[s + 0.5 for s in sizes]
+        len(matrices), len(sizes), PAGE, 2.1 * len(matrices), width_ratios=sizes
     )
-    for row, (policy, chains) in zip(axes, matrices.items(), strict=True):
-        for axis, (title, (labels, counts)) in zip(row, chains.items(), strict=True):
+    for row, (policy, chain) in zip(axes, matrices.items(), strict=True):
+        for axis in row[len(chain) :]:
+            axis.set_visible(False)
+        for axis, (title, (labels, counts)) in zip(row, chain.items(), strict=False):
             total = np.maximum(counts.sum(axis=1, keepdims=True), 1)
             shares = counts / total
             _heat(axis, shares, labels, labels, [[f"{100 * s:.0f}" for s in row] for row in shares])
-            axis.set_title(f"{title}\n(n = {int(counts.sum()):,})", fontsize=8)
+            lines = (*title.split(": "), f"(n = {int(counts.sum()):,})")
+            axis.set_title("\n".join(lines), fontsize=8)
             axis.tick_params(labelsize=6.5, pad=1.5)
             axis.set_xlabel("predicted", fontsize=8)
         row[0].set_ylabel(f"{POLICIES[policy]}\nin the data")

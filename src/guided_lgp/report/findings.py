@@ -74,21 +74,18 @@ def unseen(kinds: Mapping[str, str]) -> str:
     )
 
 
-def scalability(
-    metrics: Metrics, timing: Metrics, calls: Mapping[tuple[str, str], float]
-) -> list[str]:
+def scalability(metrics: Metrics, timing: Metrics) -> list[str]:
     """How guided search compares with breadth-first and the paper, and where a rival beats it.
 
     Args:
         metrics: by problem and planner.
         timing: as ``metrics``.
-        calls: by problem and planner, mean number of policy calls.
     """
     return [
         *_against_breadth_first(metrics, timing),
         *_against_the_paper(metrics),
         *_solved(metrics),
-        *_many_boxes(metrics, timing, calls),
+        *_many_boxes(metrics, timing),
         *_rivals(metrics, timing),
     ]
 
@@ -170,9 +167,7 @@ def _solved(metrics: Metrics) -> Iterator[str]:
         yield from partial
 
 
-def _many_boxes(
-    metrics: Metrics, timing: Metrics, calls: Mapping[tuple[str, str], float]
-) -> Iterator[str]:
+def _many_boxes(metrics: Metrics, timing: Metrics) -> Iterator[str]:
     """Problems beyond the paper's: effort of the relational policy, and what rivals solve."""
     for problem in compared(metrics):
         cells = metrics[problem.name]
@@ -187,7 +182,7 @@ def _many_boxes(
         yield (
             f"{problem.name} (K = {problem.k_min}): the relational policy, greedy, solves "
             f"{cells['relational']['problems_solved']} of {cells['relational']['problems']} with "
-            f"{number(calls.get((problem.name, 'relational')))} policy calls and "
+            f"{number(cells['relational']['policy_calls_mean'])} policy calls and "
             f"{number(seconds, 2)} s on average without the path bound; {_join(rivals)}."
         )
 

@@ -31,12 +31,16 @@ _OUTCOMES = (
 )
 _RUNS = (
     *("problem", "configuration", "objective", "planner"),
-    *("solved", "reason", "skeleton", "policy_calls"),
+    *("solved", "reason", "skeleton"),
 )
 _MEANS = (
     "tree_size_mean",
     "tree_size_std",
     "plan_length_mean",
+    "expansions_mean",
+    "policy_calls_mean",
+    "coarse_calls_mean",
+    "path_calls_mean",
     "time_mean_s",
     "time_std_s",
     "symbolic_s",

@@ -16,7 +16,7 @@ from guided_lgp.params import BoundsParams, Params
 from guided_lgp.paths import METRICS, REPORTS
 from guided_lgp.policy.split import training_objectives
 from guided_lgp.report import analysis, figures, tables
-from guided_lgp.report.contents import Calls, compose
+from guided_lgp.report.contents import compose
 from guided_lgp.report.inputs import Inputs, Metrics, compared, load_inputs
 from guided_lgp.report.pictures import draw_scene
 from guided_lgp.report.replay import replay_html
@@ -49,7 +49,7 @@ def run(params: Params, root: Path) -> None:
     write_json(root / METRICS / "training.json", tables.training_metrics(inputs.training))
     _write_curves(inputs, reports / "curves")
     novelty = _novelty(inputs, params)
-    calls = Calls(analysis.calls_per_action(inputs.problems), analysis.policy_calls(inputs.runs))
+    calls = analysis.calls_per_action(inputs.problems)
     written = {table.name: table for table in _tables(inputs, novelty, calls)}
     for table in written.values():
         for suffix, text in (
@@ -79,13 +79,13 @@ def _novelty(inputs: Inputs, params: Params) -> Mapping[str, str]:
     return analysis.novelty(symbols, chosen)
 
 
-def _tables(inputs: Inputs, novelty: Mapping[str, str], calls: Calls) -> list[Table]:
+def _tables(inputs: Inputs, novelty: Mapping[str, str], calls: Mapping[str, float]) -> list[Table]:
     rejected = {name: (len(s.scenes), s.rejected) for name, s in inputs.scenes.items()}
     optional = [tables.geometry(inputs.geometry)] if inputs.geometry is not None else []
     return [
-        tables.generalization(inputs.generalization, calls.per_action),
+        tables.generalization(inputs.generalization, calls),
         tables.unseen(analysis.by_novelty(inputs.problems, novelty), novelty),
-        *tables.scalability(inputs.scalability, inputs.timing, calls.by_problem),
+        *tables.scalability(inputs.scalability, inputs.timing),
         tables.training(inputs.training),
         tables.enumeration(analysis.by_length(inputs.verdicts), rejected),
         *optional,
@@ -117,9 +117,8 @@ def _figures(inputs: Inputs, params: Params) -> Mapping[str, Figure]:
     matrices: dict[str, dict[str, tuple[list[str], np.ndarray]]] = {}
     for policy, name, report in _sub_policies(inputs):
         curves.setdefault(name, {})[policy] = report["curves"]
-        if "confusion" in report:
-            counts = report["classes"], np.array(report["confusion"])
-            matrices.setdefault(policy, {})[name] = counts
+        counts = report["classes"], np.array(report["confusion"])
+        matrices.setdefault(policy, {})[name] = counts
     limit = params.compare_scalability.max_tree_size
     return {
         "headline": figures.headline(inputs.scalability, inputs.timing, limit),

@@ -142,20 +142,17 @@ def unseen(shares: pd.DataFrame, novelty: Mapping[str, str]) -> Table:
     )
 
 
-def scalability(
-    metrics: Metrics, timing: Metrics, calls: Mapping[tuple[str, str], float]
-) -> list[Table]:
+def scalability(metrics: Metrics, timing: Metrics) -> list[Table]:
     """Table III: tree size and time of every planner beside the paper's, then the details.
 
     Args:
         metrics: by problem and planner.
         timing: as ``metrics``.
-        calls: by problem and planner, mean number of policy calls.
     """
     return [
         _comparison("tree_size", metrics, metrics),
         _comparison("time", metrics, timing),
-        _details(metrics, timing, calls),
+        _details(metrics, timing),
     ]
 
 
@@ -253,7 +250,7 @@ def search_time(times: Metrics) -> float | None:
     return None if None in parts else float(sum(parts))
 
 
-def _details(metrics: Metrics, timing: Metrics, calls: Mapping[tuple[str, str], float]) -> Table:
+def _details(metrics: Metrics, timing: Metrics) -> Table:
     rows, records = [], []
     parts = ("symbolic_s", "policy_s", "coarse_s", "path_s")
     for problem in compared(metrics):
@@ -268,14 +265,15 @@ def _details(metrics: Metrics, timing: Metrics, calls: Mapping[tuple[str, str], 
                     PLANNERS[planner],
                     f"{cell['problems_solved']}/{cell['problems']}",
                     number(cell["plan_length_mean"]),
-                    number(calls.get((problem.name, planner))),
+                    number(cell["policy_calls_mean"]),
+                    number(cell["coarse_calls_mean"]),
+                    number(cell["path_calls_mean"]),
                     *(number(times[part], 3) for part in parts),
                     number(search_time(times), 3),
                     number(times["peak_rss_mb"], 0),
                 )
             )
-            made = {"policy_calls_mean": calls.get((problem.name, planner))}
-            records.append({"problem": problem.name, "planner": planner, **cell, **made, **times})
+            records.append({"problem": problem.name, "planner": planner, **cell, **times})
     return Table(
         "table_3_details",
         "Scalability in detail: plans, parts of the time, memory",
@@ -285,6 +283,8 @@ def _details(metrics: Metrics, timing: Metrics, calls: Mapping[tuple[str, str], 
             "Solved",
             "Plan length",
             "Policy calls",
+            "Coarse calls",
+            "Path calls",
             "Symbolic (s)",
             "Policy (s)",
             "Coarse (s)",
@@ -294,8 +294,9 @@ def _details(metrics: Metrics, timing: Metrics, calls: Mapping[tuple[str, str], 
         ),
         tuple(rows),
         (
-            "Means over the problems solved; without path: symbolic, policy and coarse. Peak: "
-            "resident memory of the process, libraries included.",
+            "Means over the problems solved. Calls count whether or not the verdict was known from "
+            "another planner. Without path: symbolic, policy and coarse. Peak: resident memory of "
+            "the process, libraries included.",
         ),
         labels=2,
         records=records,
