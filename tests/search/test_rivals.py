@@ -96,3 +96,13 @@ def test_landmark_cut_is_admissible_and_informed() -> None:
             assert (bound == 0) == (exact[number] == 0)
             informed += bound == exact[number]
     assert informed > 0.8 * len(objectives) * len(space.states)
+
+
+def test_a_layer_ends_at_the_limit_of_the_size() -> None:
+    """The layers of five boxes grow to tens of thousands of states."""
+    scene = make_scene(5, tray=True)
+    objective = parse_objective([f"(on {box} tray)" for box in scene.symbols.boxes])
+    limits = LIMITS.model_copy(update={"max_tree_size": 2000})
+    result = graph.plan(scene, objective, scene.symbols, ScriptedBounds(scene), limits)
+    assert result.reason == "stopped"
+    assert 2000 <= result.tree_size < 2100

@@ -7,7 +7,7 @@ from guided_lgp.params import SearchLimits
 from guided_lgp.scene import Scene
 from guided_lgp.search.bounds import Bounds
 from guided_lgp.search.result import Run, SearchResult
-from guided_lgp.search.tree import StateSpace, distances
+from guided_lgp.search.tree import GoalStates, StateSpace, distances
 
 
 def plan(
@@ -46,8 +46,10 @@ class _Graph:
     def __init__(self, space: StateSpace, objective: Objective, max_size: int) -> None:
         self._space = space
         self._objective = objective
+        self._goals = GoalStates(space, objective)
         self._max_size = max_size
-        self._next = 0
+        self._expanded = 0
+        self._goal_found = False
         self._sequence_nodes = 0
         self.excluded: set[Skeleton] = set()
 
@@ -56,17 +58,21 @@ class _Graph:
         return len(self._space.states) + self._sequence_nodes
 
     def expand_layer(self) -> int:
-        """Expand the states found last; how many they were."""
-        layer = range(self._next, len(self._space.states))
+        """Expand the states found last, up to the limit of the size; how many they were."""
+        layer = range(self._expanded, len(self._space.states))
         for state in layer:
-            self._space.transitions(state)
-        self._next = layer.stop
-        return len(layer)
+            if self.size >= self._max_size:
+                break
+            transitions = self._space.transitions(state)
+            self._goal_found |= any(target in self._goals for _, target in transitions)
+            self._expanded += 1
+        return self._expanded - layer.start
 
     def sequences(self, length: int) -> Iterator[Skeleton]:
         """Sequences of one length to the objective that pass no excluded one."""
-        to_go = distances(self._space, self._objective)
-        yield from self._extend((), 0, length, to_go)
+        if self._goal_found:
+            to_go = distances(self._space, self._objective)
+            yield from self._extend((), 0, length, to_go)
 
     def _extend(
         self, prefix: Skeleton, state: int, length: int, to_go: dict[int, int]
