@@ -2,7 +2,7 @@
 
 import reprlib
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin
 
 import yaml
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
@@ -24,25 +24,30 @@ Seed = Annotated[int, Field(strict=True, ge=0, lt=2**63)]
 Flag = Annotated[bool, Field(strict=True)]
 
 
-class _Section(BaseModel):
+class Section(BaseModel):
+    """A part of a file of parameters."""
+
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-class Parallel(_Section):
+Parameters = TypeVar("Parameters", bound=Section)
+
+
+class Parallel(Section):
     """Fan-out inside a stage; results do not depend on it."""
 
     backend: Literal["loky", "dask"]
     workers: Annotated[int, Field(strict=True, ge=1, le=4096)]
 
 
-class BoundsParams(_Section):
+class BoundsParams(Section):
     """Limits of the NLP's two bounds."""
 
     coarse_tries: Annotated[int, Field(strict=True, ge=1, le=1000)]
     path_solutions: Annotated[int, Field(strict=True, ge=1, le=100)]
 
 
-class GenerateScenes(_Section):
+class GenerateScenes(Section):
     """Configurations of the setups (paper, Table V)."""
 
     training_configurations: Annotated[int, Field(strict=True, ge=1, le=1_000_000)]
@@ -53,14 +58,14 @@ class GenerateScenes(_Section):
     seed_scalability: Seed
 
 
-class EnumerateSequences(_Section):
+class EnumerateSequences(Section):
     """Exhaustive enumeration of feasible skeletons."""
 
     max_length: Annotated[int, Field(strict=True, ge=1, le=10)]
     slack: Annotated[int, Field(strict=True, ge=0, le=4)]
 
 
-class Variant(_Section):
+class Variant(Section):
     """How samples are made and encoded; the defaults are the paper's."""
 
     adapted_goals: Flag = False
@@ -85,7 +90,7 @@ class Variant(_Section):
     """Feed each sub-policy with the decisions before it in its chain."""
 
 
-class BuildDataset(_Section):
+class BuildDataset(Section):
     """Draw of the training objectives (paper, Table V)."""
 
     training_objectives: Annotated[int, Field(strict=True, ge=1, le=72)]
@@ -94,7 +99,7 @@ class BuildDataset(_Section):
     """What the improved variant of the paper's networks is trained on."""
 
 
-class Network(_Section):
+class Network(Section):
     """Architecture and optimiser of one network (paper, Table IV)."""
 
     layers: Annotated[int, Field(strict=True, ge=1, le=20)]
@@ -106,7 +111,7 @@ class Network(_Section):
     lr: Annotated[float, Field(gt=0, le=1), _NUMBER]
 
 
-class TrainPolicy(_Section):
+class TrainPolicy(Section):
     """Training of the three networks (paper, Table IV)."""
 
     seed: Seed
@@ -117,7 +122,7 @@ class TrainPolicy(_Section):
     place: Network
 
 
-class TrainRelational(_Section):
+class TrainRelational(Section):
     """Training of the relational policy."""
 
     seed: Seed
@@ -131,7 +136,7 @@ class TrainRelational(_Section):
     lr: Annotated[float, Field(gt=0, le=1), _NUMBER]
 
 
-class SearchLimits(_Section):
+class SearchLimits(Section):
     """Limits of a search: depth and reattempts of the guided one, nodes and paths of any."""
 
     max_depth: Annotated[int, Field(strict=True, ge=1, le=100)]
@@ -140,7 +145,7 @@ class SearchLimits(_Section):
     max_paths: Annotated[int, Field(strict=True, ge=1, le=10_000)]
 
 
-class Params(_Section):
+class Params(Section):
     """All parameters; top keys are stage names."""
 
     parallel: Parallel
@@ -156,7 +161,16 @@ class Params(_Section):
 
 
 def load_params(path: Path = Path("params.yaml")) -> Params:
-    """Read and check the parameters.
+    """Read and check the parameters of the pipeline; see :func:`read_params`."""
+    return read_params(path, Params)
+
+
+def read_params(path: Path, model: type[Parameters]) -> Parameters:
+    """Read and check a file of parameters.
+
+    Args:
+        path: the file.
+        model: what it shall hold.
 
     Raises:
         InputError: the file is missing, is not YAML, has an unknown key, a wrong type or an
@@ -172,22 +186,22 @@ def load_params(path: Path = Path("params.yaml")) -> Params:
         # PyYAML raises the last three for values that do not fit their tag, such as 2024-13-45.
         raise InputError(str(path), f"is not YAML: {' '.join(str(error).split())}") from None
     try:
-        return Params.model_validate(document)
+        return model.model_validate(document)
     except ValidationError as error:
-        raise _input_error(path, error) from None
+        raise _input_error(path, error, model) from None
 
 
-def _input_error(path: Path, error: ValidationError) -> InputError:
+def _input_error(path: Path, error: ValidationError, model: type[BaseModel]) -> InputError:
     first = error.errors()[0]
     keys = [str(part) for part in first["loc"]]
     where = f"{path}: {'.'.join(keys)}" if keys else str(path)
     match first["type"]:
         case "extra_forbidden":
-            return InputError(where, "unknown key", ", ".join(_accepted_keys(keys[:-1])))
+            return InputError(where, "unknown key", ", ".join(_accepted_keys(model, keys[:-1])))
         case "missing":
             return InputError(where, "missing")
         case "model_type":
-            return InputError(where, "is not a mapping", ", ".join(_accepted_keys(keys)))
+            return InputError(where, "is not a mapping", ", ".join(_accepted_keys(model, keys)))
     return InputError(where, f"{first['msg'].lower()}, not {_brief(first['input'])}")
 
 
@@ -199,10 +213,9 @@ def _brief(value: object) -> str:
         return "a number of thousands of digits"
 
 
-def _accepted_keys(section: list[str]) -> list[str]:
-    model: type[BaseModel] = Params
+def _accepted_keys(model: type[BaseModel], section: list[str]) -> list[str]:
+    kind: Any = model
     for key in section:
-        nested = model.model_fields[key].annotation
-        assert isinstance(nested, type)
-        model = nested
-    return list(model.model_fields)
+        # a mapping of names of one's own to sections, or a section with fields
+        kind = get_args(kind)[1] if get_origin(kind) is dict else kind.model_fields[key].annotation
+    return list(kind.model_fields) if isinstance(kind, type) else []
