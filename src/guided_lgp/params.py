@@ -218,4 +218,4 @@ def _accepted_keys(model: type[BaseModel], section: list[str]) -> list[str]:
     for key in section:
         # a mapping of names of one's own to sections, or a section with fields
         kind = get_args(kind)[1] if get_origin(kind) is dict else kind.model_fields[key].annotation
-    return list(kind.model_fields) if isinstance(kind, type) else []
+    return list(getattr(kind, "model_fields", ()))

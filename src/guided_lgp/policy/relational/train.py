@@ -51,20 +51,9 @@ def train_relational(
         InputError: too few problems to split, or a training that diverges at once.
     """
     problems = examples(dataset)
-    tasks = [
-        _Task(split, problems, _held_out(problems, split, settings), settings) for split in SPLITS
-    ]
-    for task in tasks:
-        held_out = np.count_nonzero(task.validation)
-        if not 0 < held_out < len(problems):
-            raise InputError(
-                "train_relational.validation_share",
-                f"{held_out} of {len(problems)} problems for validation (split: {task.split})",
-                "a share that leaves problems on both sides; or more configurations",
-            )
+    tasks = [_task(problems, split, settings) for split in SPLITS]
     fits = dict(zip(SPLITS, run(_train, tasks, parallel, "training relational"), strict=True))
-    training = {"samples": len(problems), **settings.model_dump()}
-    Model(fits["random"].weights, training).save(directory)
+    _model(tasks[0], fits["random"]).save(directory)
     return TrainingReport(
         network=NAME,
         seed=settings.seed,
@@ -77,6 +66,33 @@ def train_relational(
             }
         },
     )
+
+
+def train_split(dataset: Dataset, settings: TrainRelational, split: str) -> Model:
+    """The network with one split, in this process; for studies, which train many policies.
+
+    Raises:
+        InputError: too few problems to split, or a training that diverges at once.
+    """
+    task = _task(examples(dataset), split, settings)
+    return _model(task, _train(task))
+
+
+def _task(problems: Examples, split: str, settings: TrainRelational) -> _Task:
+    task = _Task(split, problems, _held_out(problems, split, settings), settings)
+    held_out = np.count_nonzero(task.validation)
+    if not 0 < held_out < len(problems):
+        raise InputError(
+            "train_relational.validation_share",
+            f"{held_out} of {len(problems)} problems for validation (split: {split})",
+            "a share that leaves problems on both sides; or more configurations",
+        )
+    return task
+
+
+def _model(task: _Task, result: Fit) -> Model:
+    training = {"samples": len(task.problems), **task.settings.model_dump()}
+    return Model(result.weights, training)
 
 
 def _held_out(problems: Examples, split: str, settings: TrainRelational) -> BoolArray:
