@@ -6,6 +6,7 @@ from guided_lgp.logic import Skeleton, parse_objective, parse_skeleton, progress
 from guided_lgp.params import SearchLimits
 from guided_lgp.scene.model import Scene
 from guided_lgp.search import best_first, breadth_first
+from guided_lgp.search.result import MAX_COARSE
 
 TOWER = parse_objective(["(on red green)", "(on green blue)"])
 
@@ -124,3 +125,11 @@ def test_ends_after_so_many_sequences_without_a_path(scene: Scene, limits: Searc
     )
     assert (result.reason, result.path_calls) == ("paths", 5)
     assert "limit of sequences without a path" in result.explanation
+
+
+def test_ends_after_so_many_coarse_bounds(scene: Scene, limits: SearchLimits) -> None:
+    bounds = ScriptedBounds(scene, coarse=lambda skeleton: len(skeleton) < 4)
+    limits = limits.model_copy(update={"max_tree_size": 400_000})
+    result = best_first.plan(scene, TOWER, scene.symbols, bounds, UNIFORM, limits)
+    assert (result.reason, result.coarse_calls) == ("coarse", MAX_COARSE)
+    assert "limit of sequences for the coarse bound" in result.explanation

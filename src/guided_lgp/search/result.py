@@ -14,12 +14,17 @@ from guided_lgp.search.policy import Policy
 Cause = Literal["infeasible", "max_depth"]
 """Why an attempt of the guided search ended (paper, Table I)."""
 
-Reason = Literal["stopped", "paths", "exhausted", "attempts"]
-"""Why a search ended without a plan: limit of nodes or of paths, nothing left to expand, or no
-reattempt left."""
+MAX_COARSE = 1000
+"""Sequences that one search hands to the coarse bound: more than 20 times what any of the paper's
+problems needs, and minutes at 20 actions, where a search could otherwise take a day."""
+
+Reason = Literal["stopped", "coarse", "paths", "exhausted", "attempts"]
+"""Why a search ended without a plan: limit of nodes or of either bound, nothing left to expand, or
+no reattempt left."""
 
 REASONS: Mapping[Reason, str] = {
     "stopped": "stopped at the limit of the tree size",
+    "coarse": "stopped at the limit of sequences for the coarse bound",
     "paths": "stopped at the limit of sequences without a path",
     "exhausted": "every sequence within the depth limit is infeasible",
     "attempts": "the last allowed attempt failed",
@@ -167,6 +172,8 @@ class Run:
         """The limit that ends the search, if one is reached."""
         if self._path_calls >= limits.max_paths:
             return "paths"
+        if len(self._asked) >= MAX_COARSE:
+            return "coarse"
         return "stopped" if tree_size >= limits.max_tree_size else None
 
     def attempt_failed(self, cause: Cause) -> None:
