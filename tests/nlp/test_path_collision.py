@@ -53,6 +53,21 @@ def test_never_more_optimistic_than_pybullet(checker: CollisionChecker, gripper:
     assert agreed >= 0.95 * 300
 
 
+def test_distances_and_their_gradients(checker: CollisionChecker) -> None:
+    rng = np.random.default_rng(3)
+    checker.enter(Mode("pr2L", initial_poses(SCENE)))
+    low = np.array([0.3, 0.5, 0.9, -1.2, 0.6, -0.9, 0.4])  # above tab1 and its boxes
+    for _ in range(10):
+        q = HOME_CONFIGURATION.copy()
+        q[:7] = low + rng.uniform(-0.25, 0.25, 7)
+        (distances,), (gradients,) = checker.distances(q[None], OPEN, 3)
+        assert np.all(np.diff(distances) >= 0)
+        assert (distances[0] < 0.003) == (checker.first_collision(q[None], OPEN) is not None)
+        steps = 1e-5 * np.eye(14)
+        ahead, behind = (checker.distances(q + d, OPEN, 1)[0][:, 0] for d in (steps, -steps))
+        assert gradients[0] == pytest.approx((ahead - behind) / 2e-5, abs=0.02)
+
+
 def test_carried_box_moves_with_the_hand(checker: CollisionChecker) -> None:
     standing = initial_poses(SCENE)
     tool = tool_pose(SCENE, HOME_CONFIGURATION, "pr2L")

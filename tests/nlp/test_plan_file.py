@@ -98,6 +98,18 @@ def _text_for_number(plan: dict[str, Any]) -> None:
     plan["path"]["times"][0] = "soon"
 
 
+def _unknown_joint(plan: dict[str, Any]) -> None:
+    plan["joint_names"][3] = "nose"
+
+
+def _repeat_joint(plan: dict[str, Any]) -> None:
+    plan["joint_names"][3] = plan["joint_names"][4]
+
+
+def _last_for_ever(plan: dict[str, Any]) -> None:
+    plan["path"]["times"][-1] = 1e300
+
+
 def _drop_scene(plan: dict[str, Any]) -> None:
     del plan["scene"]
 
@@ -116,6 +128,9 @@ def _drop_keyframes(plan: dict[str, Any]) -> None:
         (_attach_unknown, "unknown box"),
         (_garble_action, "throw"),
         (_text_for_number, "path.times.0"),
+        (_unknown_joint, "joint_names"),
+        (_repeat_joint, "joint_names"),
+        (_last_for_ever, r"path.times.\d+: .* less than"),
         (_drop_scene, "scene"),
         (_drop_keyframes, "0 keyframes"),
     ],
@@ -135,6 +150,13 @@ def test_missing_and_truncated_files(file: Path) -> None:
         read_plan(file.with_name("none.json"))
     file.write_text(file.read_text()[:500])
     with pytest.raises(InputError, match="is not JSON"):
+        read_plan(file)
+
+
+def test_nested_too_deeply(tmp_path: Path) -> None:
+    file = tmp_path / "deep.json"
+    file.write_text("[" * 100_000)
+    with pytest.raises(InputError, match="nested too deeply"):
         read_plan(file)
 
 

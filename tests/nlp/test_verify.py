@@ -22,8 +22,9 @@ from motions import (
 from guided_lgp.logic import Action, State, parse_skeleton
 from guided_lgp.nlp.results import Array, Keyframe, Trajectory
 from guided_lgp.nlp.verify import verify_keyframe, verify_keyframes, verify_path
+from guided_lgp.nlp.verify.path import STEP, resample
 from guided_lgp.scene import Scene, pr2
-from guided_lgp.scene.poses import compose, inverse, multiply, pose
+from guided_lgp.scene.poses import apply, compose, inverse, multiply, pose
 from guided_lgp.scene.reach import grasp_poses
 from guided_lgp.scene.world import World
 
@@ -269,8 +270,39 @@ def good(two_boxes: Scene) -> Trajectory:
 def test_good_path(world: World, good: Trajectory) -> None:
     report = verify_path(world, GRASP_AND_PLACE, good)
     assert report.violation is None
-    assert report.configurations > len(good.times)
+    assert report.configurations > 100
     assert report.deepest_penetration <= 0.005
+
+
+def test_no_point_goes_farther_than_a_step_between_two_checks(
+    two_boxes: Scene, good: Trajectory
+) -> None:
+    rng = np.random.default_rng(4)
+    low, high = np.r_[pr2.JOINT_LIMITS, np.tile(pr2.FINGER_LIMITS, (8, 1))].T
+    corners = np.clip(rng.uniform(low, high, (12, 22)), -3.0, 3.0)
+    times = np.arange(12.0)
+    fine = np.linspace(0.0, 11.0, 600)
+    anywhere = np.stack([np.interp(fine, times, column) for column in corners.T], axis=1)
+    sides = rng.normal(size=(2, 60, 3))
+    reach = [0.12, 0.2]
+    for q in (good.q, anywhere):
+        samples, _ = resample(two_boxes, q, np.arange(float(len(q))), reach)
+        levers = 0.0
+        farthest = np.zeros(len(samples) - 1)
+        for gripper, beyond, rays in zip(pr2.SIDE, reach, sides, strict=True):
+            ball = beyond * rays / np.linalg.norm(rays, axis=1, keepdims=True)
+            tools = pr2.tool_poses(two_boxes, samples[:, :14])[gripper]
+            points = [apply(tools[:, None], ball)]
+            arm = pr2.ARM_LINKS[gripper]
+            for link, ahead in ((arm[3], 0.4), (arm[6], 0.3)):  # upper arm and forearm
+                body = np.vstack([np.zeros(3), [ahead, 0, 0], [ahead / 2, 0.08, 0.0]])
+                points.append(apply(pr2.link_poses(two_boxes, samples[:, :14], [link]), body))
+            moved = np.linalg.norm(np.diff(np.concatenate(points, axis=1), axis=0), axis=-1)
+            farthest = np.maximum(farthest, moved.max(axis=1))
+            turns = np.abs(np.diff(q[:, pr2.arm_slice(gripper)], axis=0)).sum(axis=0)
+            levers = max(levers, float(turns @ (pr2.LEVER[pr2.arm_slice(gripper)] + beyond)))
+        assert farthest.max() <= 1.01 * STEP
+        assert len(samples) < 0.75 * levers / STEP
 
 
 def jump(path: Trajectory) -> Trajectory:
@@ -344,6 +376,15 @@ def without_fingers(path: Trajectory) -> Trajectory:
     return replace(path, joint_names=path.joint_names[:14], q=path.q[:, :14])
 
 
+def never_ends(path: Trajectory) -> Trajectory:
+    return replace(path, times=np.r_[path.times[:-1], np.inf])
+
+
+def a_joint_twice(path: Trajectory) -> Trajectory:
+    names = (*path.joint_names, path.joint_names[0])
+    return replace(path, joint_names=names, q=np.c_[path.q, path.q[:, 0]])
+
+
 @pytest.mark.parametrize(
     ("change", "reason"),
     [
@@ -359,7 +400,9 @@ def without_fingers(path: Trajectory) -> Trajectory:
         (never_attached, "attachments"),
         (still_held, "attachments"),
         (backwards, "samples"),
+        (never_ends, "samples"),
         (without_fingers, "joint names"),
+        (a_joint_twice, "joint names"),
     ],
 )
 def test_spoilt_path(
@@ -368,6 +411,23 @@ def test_spoilt_path(
     violation = verify_path(world, GRASP_AND_PLACE, change(good)).violation
     assert violation is not None
     assert violation.constraint.startswith(reason)
+
+
+@pytest.mark.parametrize(
+    ("skeleton", "action"),
+    [
+        ("(place pr2L red tab1)", 0),
+        ("(grasp pr2L pink) (place pr2L pink tab1)", 0),
+        ("(grasp pr2L red) (place pr2L red shelf)", 1),
+        ("(grasp pr2L red) (grasp pr2L green)", 1),
+    ],
+)
+def test_skeleton_that_cannot_be(
+    world: World, good: Trajectory, skeleton: str, action: int
+) -> None:
+    violation = verify_path(world, parse_skeleton(skeleton), good).violation
+    assert violation is not None
+    assert (violation.constraint, violation.action) == ("skeleton", action)
 
 
 def test_jump_is_found_where_it_is(world: World, good: Trajectory) -> None:

@@ -58,7 +58,7 @@ def execute(
         skeleton: the actions that the trajectory carries out.
         trajectory: the motion.
     """
-    rows = switches_of(scene.state, skeleton, trajectory)
+    rows = switches_of(scene, skeleton, trajectory)
     if isinstance(rows, Violation):
         return PhysicsReport(False, fault=rows.constraint)
     planned = final_boxes(scene, trajectory)

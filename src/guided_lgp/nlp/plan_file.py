@@ -15,9 +15,10 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from guided_lgp.documents import read_json
 from guided_lgp.errors import InputError
 from guided_lgp.logic import Action, Goal, Objective, Skeleton
-from guided_lgp.nlp.results import Attachment, Keyframe, PathResult, Trajectory
+from guided_lgp.nlp.results import JOINT_NAMES, Attachment, Keyframe, PathResult, Trajectory
 from guided_lgp.nlp.verify.path import switches_of
 from guided_lgp.scene import Scene
 from guided_lgp.scene.poses import yaw_of
@@ -25,6 +26,8 @@ from guided_lgp.scene.poses import yaw_of
 _DECIMALS = 6
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
+Angle = Annotated[float, Field(ge=-100, le=100)]
+Time = Annotated[float, Field(ge=0, le=1e5)]
 Index = Annotated[int, Field(strict=True, ge=0)]
 
 
@@ -43,7 +46,7 @@ class BoxPose(_Document):
 class PlanKeyframe(_Document):
     """The configuration at the switch of one action."""
 
-    q: tuple[Finite, ...]
+    q: tuple[Angle, ...]
     boxes: dict[str, BoxPose]
 
 
@@ -59,8 +62,8 @@ class PlanAttachment(_Document):
 class PlanPath(_Document):
     """The dense motion."""
 
-    times: Annotated[tuple[Finite, ...], Field(min_length=1)]
-    q: tuple[tuple[Finite, ...], ...]
+    times: Annotated[tuple[Time, ...], Field(min_length=1)]
+    q: tuple[tuple[Angle, ...], ...]
     attachments: tuple[PlanAttachment, ...]
 
 
@@ -100,6 +103,8 @@ class Plan(_Document):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
+        if sorted(self.joint_names) != sorted(JOINT_NAMES):
+            raise ValueError(f"joint_names are not the {len(JOINT_NAMES)} of arms and fingers")
         rows, width = len(self.path.times), len(self.joint_names)
         if len(self.path.q) != rows:
             raise ValueError(f"path.q has {len(self.path.q)} rows for {rows} times")
@@ -148,7 +153,7 @@ def write_plan(
     trajectory = result.trajectory
     if trajectory is None:
         raise ValueError("an infeasible result has no plan")
-    switches = switches_of(scene.state, result.skeleton, trajectory)
+    switches = switches_of(scene, result.skeleton, trajectory)
     assert isinstance(switches, list)  # the result has been verified
     rows = np.round(trajectory.q, _DECIMALS)
     document = {
@@ -193,12 +198,7 @@ def read_plan(path: Path) -> Plan:
         InputError: the file is missing, is not JSON, or is not a plan; the message names the
             field and the fault.
     """
-    try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(str(path), error.strerror or "cannot be read") from None
-    except ValueError as error:
-        raise InputError(str(path), f"is not JSON: {error}") from None
+    document = read_json(path, "a plan as written by guided-lgp plan --out")
     try:
         return Plan.model_validate(document)
     except ValidationError as error:

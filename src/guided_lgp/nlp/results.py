@@ -13,8 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guided_lgp.logic import Skeleton
+from guided_lgp.scene import GRIPPERS
+from guided_lgp.scene.pr2 import ARM_JOINTS, FINGER_JOINTS
 
 Array = NDArray[np.float64]
+
+JOINT_NAMES: tuple[str, ...] = (
+    *ARM_JOINTS,
+    *(joint for gripper in GRIPPERS for joint in FINGER_JOINTS[gripper]),
+)
+"""Every joint that moves: both arms, then the fingers of both hands."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +82,7 @@ class Trajectory:
     """A dense, time-parameterised motion (paper, eq. 4)."""
 
     joint_names: tuple[str, ...]
-    """Every joint that moves, the fingers included."""
+    """Every joint that moves (``JOINT_NAMES``), in any order."""
     times: Array
     """(T,) s, strictly increasing."""
     q: Array

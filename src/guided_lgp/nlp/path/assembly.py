@@ -6,16 +6,10 @@ import numpy as np
 
 from guided_lgp.nlp.path.motions import Motion
 from guided_lgp.nlp.path.situation import Attach, Fingers, Release, Situation, Step
-from guided_lgp.nlp.path.timing import INTERVAL, time_path
-from guided_lgp.nlp.results import Array, Attachment, Trajectory
+from guided_lgp.nlp.path.timing import INTERVAL
+from guided_lgp.nlp.results import JOINT_NAMES, Array, Attachment, Trajectory
 from guided_lgp.scene import GRIPPERS
 from guided_lgp.scene.pr2 import ARM_JOINTS, FINGER_JOINTS, FINGER_VELOCITY, arm_slice
-
-JOINT_NAMES: tuple[str, ...] = (
-    *ARM_JOINTS,
-    *(joint for gripper in GRIPPERS for joint in FINGER_JOINTS[gripper]),
-)
-"""Every joint that moves: both arms, then the fingers of both hands."""
 
 _FINGER_SHARE = 0.9
 """Share of their velocity limit at which fingers move."""
@@ -40,8 +34,8 @@ def assemble(start: Situation, steps: Iterable[Step]) -> Trajectory:
     for step in steps:
         last = rows[-1][-1]
         match step:
-            case Motion(gripper, path):
-                clock, values = time_path(path, gripper)
+            case Motion(gripper):
+                clock, values = step.timed
                 if sum(holder == gripper for holder, _ in open_since.values()) > 1:
                     clock = _CAREFUL * clock
                 columns = arm_slice(gripper)

@@ -7,6 +7,7 @@ from guided_lgp.nlp.coarse import CoarseBound
 from guided_lgp.nlp.path.assembly import assemble
 from guided_lgp.nlp.path.grips import grips_of
 from guided_lgp.nlp.path.motions import Mover
+from guided_lgp.nlp.path.optimise import optimise
 from guided_lgp.nlp.path.options import Options, Outcome, Trouble
 from guided_lgp.nlp.path.situation import Situation
 from guided_lgp.nlp.results import CoarseResult, Failure, PathResult
@@ -75,8 +76,11 @@ class PathBound:
             if not isinstance(outcomes, list):
                 continue
             steps = [step for outcome in outcomes for step in outcome.steps]
-            trajectory = assemble(options.start, steps)
-            report = verify_path(self._world, skeleton, trajectory)
+            for chosen in (optimise(self._mover, steps), steps):
+                trajectory = assemble(options.start, chosen)
+                report = verify_path(self._world, skeleton, trajectory)
+                if report.violation is None:
+                    break
             if report.violation is not None:
                 fault = report.violation
                 trouble.note(fault.action, 10, fault.constraint)

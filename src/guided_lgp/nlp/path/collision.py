@@ -81,7 +81,8 @@ class CollisionChecker:
         tool = {g: self._model.frames[self._model.getFrameId(TOOL_LINK[g])] for g in GRIPPERS}
         self._tool = {g: (frame.parentJoint, frame.placement) for g, frame in tool.items()}
         self._candidates = self._candidate_pairs(len(scene.tables) + len(scene.boxes))
-        for first, second in zip(*np.nonzero(np.triu(self._candidates, 1)), strict=True):
+        self._pairs = np.nonzero(np.triu(self._candidates, 1))
+        for first, second in zip(*self._pairs, strict=True):
             self._geometry.addCollisionPair(pin.CollisionPair(int(first), int(second)))
         self._data = self._model.createData()
         self._geometry_data = self._geometry.createData()
@@ -99,6 +100,9 @@ class CollisionChecker:
         self._plain_at = [self._coordinate(ARM_JOINTS[i]) for i in self._plain]
         self._cosine_at = [self._coordinate(ARM_JOINTS[i]) for i in CONTINUOUS]
         self._sine_at = [index + 1 for index in self._cosine_at]
+        self._velocity_at = [
+            int(self._model.joints[self._model.getJointId(joint)].idx_v) for joint in ARM_JOINTS
+        ]
         self._finger_at = {
             gripper: [self._coordinate(joint) for joint in FINGER_JOINTS[gripper]]
             for gripper in GRIPPERS
@@ -124,6 +128,7 @@ class CollisionChecker:
             first, second = self._bodies[one], self._bodies[other]
             active[first, second] = active[second, first] = False
         self._geometry_data.setActiveCollisionPairs(self._geometry, active, True)
+        self._active = np.flatnonzero(active[self._pairs]).tolist()
 
     def coordinates(self, q: Array, fingers: Mapping[str, float]) -> Array:
         """Coordinates of the pinocchio model (n, nq) for configurations (n, 14)."""
@@ -149,6 +154,48 @@ class CollisionChecker:
                 pair = self._geometry.collisionPairs[self._callback.collisionPairIndex]
                 return self._names[pair.first], self._names[pair.second]
         return None
+
+    def distances(self, q: Array, fingers: Mapping[str, float], count: int) -> tuple[Array, Array]:
+        """The smallest distances of pairs of bodies, to first order.
+
+        Args:
+            q: (n, 14) rad.
+            fingers: value (rad) of the finger joints by gripper.
+            count: how many pairs per configuration.
+
+        Returns:
+            distances (n, count) in m, negative where bodies penetrate, and their gradients
+            (n, count, 14) in m/rad.
+        """
+        values, gradients = np.empty((len(q), count)), np.empty((len(q), count, 14))
+        for row, coordinates in enumerate(self.coordinates(q, fingers)):
+            pin.computeJointJacobians(self._model, self._data, coordinates)
+            pin.computeDistances(
+                self._model, self._data, self._geometry, self._geometry_data, coordinates
+            )
+            results = self._geometry_data.distanceResults
+            found = np.array([results[pair].min_distance for pair in self._active])
+            for column, number in enumerate(np.argsort(found, kind="stable")[:count]):
+                values[row, column] = found[number]
+                gradients[row, column] = self._gradient(self._active[number])
+        return values, gradients
+
+    def _gradient(self, pair: int) -> Array:
+        """Derivative (14,) of the distance of a pair of bodies, at their nearest points."""
+        result = self._geometry_data.distanceResults[pair]
+        bodies = self._geometry.collisionPairs[pair]
+        rates = []
+        for body, point in (
+            (bodies.first, result.getNearestPoint1()),
+            (bodies.second, result.getNearestPoint2()),
+        ):
+            joint = self._geometry.geometryObjects[body].parentJoint
+            jacobian = pin.getJointJacobian(
+                self._model, self._data, joint, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+            )[:, self._velocity_at]
+            arm = np.cross(point - self._data.oMi[joint].translation, result.normal)
+            rates.append(result.normal @ jacobian[:3] + arm @ jacobian[3:])
+        return np.asarray(rates[1] - rates[0])
 
     def _add(self, name: str, joint: int, placement: Any, shape: Any) -> None:
         self._geometry.addGeometryObject(pin.GeometryObject(name, joint, placement, shape))

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -10,6 +11,7 @@ from guided_lgp.nlp.path.collision import CollisionChecker, Mode
 from guided_lgp.nlp.path.connect import connect, shortcut
 from guided_lgp.nlp.path.ik import Arm
 from guided_lgp.nlp.path.spaces import JointSpace, LevelSpace, continuous_path, turned, wound
+from guided_lgp.nlp.path.timing import time_path
 from guided_lgp.nlp.results import Array
 from guided_lgp.scene import GRIPPERS, Scene
 
@@ -24,15 +26,6 @@ _SHORTCUTS = 12
 
 
 @dataclass(frozen=True)
-class Motion:
-    """One arm follows a path from rest to rest."""
-
-    gripper: str
-    path: Array
-    """Configurations (n, 7) in rad, for a cubic spline through them."""
-
-
-@dataclass(frozen=True)
 class Still:
     """What stands still while one arm moves: the mode, the other arm, the fingers."""
 
@@ -41,6 +34,31 @@ class Still:
     """Configuration (14,); the moving arm's part does not matter."""
     fingers: Mapping[str, float]
     """Value (rad) of the finger joints by gripper."""
+
+
+@dataclass(frozen=True)
+class Free:
+    """Why a motion could be another: it only has to keep clear of what stands still."""
+
+    still: Still
+    level: bool
+    """Whether the hand keeps its tilt."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """One arm follows a path from rest to rest."""
+
+    gripper: str
+    path: Array
+    """Configurations (n, 7) in rad, for a cubic spline through them."""
+    free: Free | None = None
+    """None for a straight line, which is where it has to be."""
+
+    @cached_property
+    def timed(self) -> tuple[Array, Array]:
+        """Times (T,) in s and configurations (T, 7)."""
+        return time_path(self.path, self.gripper)
 
 
 class Mover:
@@ -60,36 +78,46 @@ class Mover:
         """The first pair of bodies in collision along configurations (n, 7) of the moving arm."""
         return self._space(still).collision(q)
 
+    def distances(self, still: Still, q: Array, count: int) -> tuple[Array, Array]:
+        """Smallest distances (n, count) in m along configurations (n, 7) of the moving arm, and
+        their gradients (n, count, 7).
+        """
+        return self._space(still).distances(q, count)
+
     def line(
         self,
-        arm: Arm,
+        still: Still,
         tool: tuple[Array, Array],
         direction: Array,
         pans: tuple[float, float],
         side: int,
-    ) -> Array | None:
-        """Move the tool straight, without turning it.
+    ) -> Array | str:
+        """A free straight line of the tool, which does not turn.
 
         Args:
-            arm: the arm.
+            still: what stands still.
             tool: rotation (3, 3) and origin (3,) of the tool frame at the start.
             direction: displacement (3,) of the tool (m).
             pans: angle of the pan joint (rad) at the start and at the end.
             side: of the elbow.
 
         Returns:
-            Configurations (n, 7), or None where the line leaves the arm's reach.
+            Configurations (n, 7), or what is wrong with it.
         """
+        arm = self.arms[still.mode.gripper]
         count = 2 + int(np.linalg.norm(direction) / LINE_STEP)
         position = tool[1] + np.linspace(0.0, 1.0, count)[:, None] * direction
         q, valid = arm.inverse(tool[0], position, np.linspace(*pans, count))
         path = continuous_path(q[:, side], valid[:, side])
         if path is None:
-            return None
+            return "out of reach"
         rotation, middle = arm.forward((path[:-1] + path[1:]) / 2)
         astray = np.abs(middle - (position[:-1] + position[1:]) / 2).max()
         turned_by = np.abs(rotation - tool[0]).max()
-        return path if astray < _ASTRAY and turned_by < 10 * _ASTRAY else None
+        if astray > _ASTRAY or turned_by > 10 * _ASTRAY:
+            return "out of reach"
+        blocked = self.collision(still, path)
+        return path if blocked is None else f"collision {' '.join(blocked)}"
 
     def transit(
         self, still: Still, start: Array, goal: Array, rng: np.random.Generator

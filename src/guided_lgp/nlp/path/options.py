@@ -10,7 +10,7 @@ import numpy as np
 from guided_lgp.logic import Skeleton, successor
 from guided_lgp.nlp.path.grips import Grips
 from guided_lgp.nlp.path.ik import REACH, Arm, continuous_near
-from guided_lgp.nlp.path.motions import Motion, Mover, Still
+from guided_lgp.nlp.path.motions import Free, Motion, Mover, Still
 from guided_lgp.nlp.path.placements import alternatives, placed, placement_of
 from guided_lgp.nlp.path.situation import (
     Attach,
@@ -204,12 +204,11 @@ class Options:
             if blocked is not None:
                 self._note(index, 0, "presenting collision", blocked)
                 continue
-            paths = self._transit(still, now, goal, loaded)
-            if paths is None:
+            steps = self._transit(still, now, goal, loaded)
+            if steps is None:
                 self._trouble.note(index, 1, "no motion found to present the support")
                 continue
-            steps = tuple(Motion(holder, path) for path in paths)
-            yield steps, self._after(situation, steps)
+            yield tuple(steps), self._after(situation, steps)
 
     def _tidied(
         self, index: int, situation: Situation
@@ -221,21 +220,26 @@ class Options:
         now = situation.q[arm_slice(other)]
         if np.array_equal(now, HOME[other]) or (held and situation.state.carried_by(held)):
             return (), situation
-        paths = self._transit(situation.still(other), now, HOME[other], level=False)
-        if paths is None:
+        steps = self._transit(situation.still(other), now, HOME[other], level=False)
+        if steps is None:
             self._trouble.note(index, 9, "no motion found for the other arm to its side")
             return None
-        steps = tuple(Motion(other, path) for path in paths)
-        return steps, self._after(situation, steps)
+        return tuple(steps), self._after(situation, steps)
 
     # -- Grasps ------------------------------------------------------------------------------
 
     def _grasps(self, index: int, situation: Situation) -> Iterator[Outcome]:
         central, others = self._grips[self._skeleton[index].box]
-        situation = self._opened(situation, self._skeleton[index].gripper)
+        opened = self._opened(situation, self._skeleton[index].gripper)
+        opening = (
+            ()
+            if opened.fingers == situation.fingers
+            else (Fingers(self._skeleton[index].gripper, FINGER_LIMITS[1]),)
+        )
         for variant in _VARIANTS:
             for grips in (central + self._coarse_grip(index), others):
-                yield from self._grasps_with(index, situation, grips, variant)
+                for outcome in self._grasps_with(index, opened, grips, variant):
+                    yield replace(outcome, steps=(*opening, *outcome.steps))
 
     def _grasps_with(
         self, index: int, situation: Situation, grips: Grips, variant: Variant
@@ -300,7 +304,7 @@ class Options:
         angle = float(reach.pans[pan])
         tool = (reach.rotation[number], reach.contact[number])
         before = continuous_near(reach.q[number, 1, pan, side], start)
-        line = self._line(
+        line = self._mover.line(
             situation.still(gripper, [(gripper, box)]),
             tool,
             -APPROACH * tool[0][:, 0],
@@ -320,7 +324,7 @@ class Options:
         assert support is not None
         rising = held.still(gripper, [(box, support)])
         for direction, shift in product(_lifts(tool[0][:, 0]), _PAN_SHIFTS):
-            lift = self._line(rising, tool, direction, (angle, angle + shift), side)
+            lift = self._mover.line(rising, tool, direction, (angle, angle + shift), side)
             if isinstance(lift, str):
                 self._trouble.note(index, 5, f"lift {lift}")
                 continue
@@ -333,18 +337,19 @@ class Options:
             if come is None:
                 self._trouble.note(index, 7, f"no motion found to the grasp of {box}")
                 return None
-            go: list[Array] | None = []
+            go: list[Motion] | None = []
             if not riders:
                 go = self._transit(held.still(gripper), upward[-1], HOME[gripper], level=False)
             if go is None:
                 self._trouble.note(index, 8, f"no motion found from the grasp of {box}")
                 continue
             steps: tuple[Step, ...] = (
-                Fingers(gripper, FINGER_LIMITS[1]),
-                *(Motion(gripper, path) for path in (*come, inward)),
+                *come,
+                Motion(gripper, inward),
                 closed,
                 attach,
-                *(Motion(gripper, path) for path in (upward, *go)),
+                Motion(gripper, upward),
+                *go,
             )
             final = self._after(held, steps[-1 - len(go) :])
             return Outcome(steps, final, reached.keyframe(self._arms))
@@ -533,7 +538,7 @@ class Options:
         tool = (reach.rotation[number], reach.contact[number])
         riders = state.carried_by(box)
         still = situation.still(gripper, [(box, action.table)])
-        line = self._line(still, tool, way, (angle, angle), side)
+        line = self._mover.line(still, tool, way, (angle, angle), side)
         if isinstance(line, str):
             self._trouble.note(index, 4, f"descent {line}")
             return None
@@ -544,7 +549,7 @@ class Options:
         left = replace(left, state=self._states[index + 1])
         leaving = left.still(gripper, [(gripper, box)])
         for direction, shift in product(_retreats(tool[0][:, 0]), _PAN_SHIFTS):
-            back = self._line(leaving, tool, direction, (angle, angle + shift), side)
+            back = self._mover.line(leaving, tool, direction, (angle, angle + shift), side)
             if isinstance(back, str):
                 self._trouble.note(index, 5, f"retreat {back}")
                 continue
@@ -558,18 +563,20 @@ class Options:
             if come is None:
                 self._trouble.note(index, 7, f"no motion found to place {box}")
                 return None
-            downward = wound(line[::-1], come[-1][-1])
+            downward = wound(line[::-1], come[-1].path[-1])
             backward = wound(back, downward[-1])
             go = self._transit(left.still(gripper), backward[-1], HOME[gripper], level=False)
             if go is None:
                 self._trouble.note(index, 8, f"no motion found from the place of {box}")
                 continue
             steps: tuple[Step, ...] = (
-                *(Motion(gripper, path) for path in (*come, downward)),
+                *come,
+                Motion(gripper, downward),
                 release,
                 *hand_over,
                 opening,
-                *(Motion(gripper, path) for path in (backward, *go)),
+                Motion(gripper, backward),
+                *go,
             )
             final = self._after(left, steps[-1 - len(go) :])
             return Outcome(steps, final, lowered.keyframe(self._arms))
@@ -656,24 +663,11 @@ class Options:
         cost[..., 1 - side] = np.inf
         return replace(reach, cost=cost)
 
-    def _line(
-        self,
-        still: Still,
-        tool: tuple[Array, Array],
-        direction: Array,
-        pans: tuple[float, float],
-        side: int,
-    ) -> Array | str:
-        """A free straight line of the tool, or what is wrong with it."""
-        path = self._mover.line(self._arms[still.mode.gripper], tool, direction, pans, side)
-        if path is None:
-            return "out of reach"
-        blocked = self._mover.collision(still, path)
-        return path if blocked is None else f"collision {' '.join(blocked)}"
-
-    def _transit(self, still: Still, start: Array, goal: Array, level: bool) -> list[Array] | None:
+    def _transit(self, still: Still, start: Array, goal: Array, level: bool) -> list[Motion] | None:
         plan = self._mover.level_transit if level else self._mover.transit
-        return plan(still, start, goal, self._rng)
+        paths = plan(still, start, goal, self._rng)
+        free = Free(still, level)
+        return None if paths is None else [Motion(still.mode.gripper, p, free) for p in paths]
 
     def _after(self, situation: Situation, steps: Sequence[Step]) -> Situation:
         for step in steps:

@@ -46,9 +46,17 @@ class JointSpace:
 
     def collision(self, path: Array) -> tuple[str, str] | None:
         """The first pair of bodies in collision along configurations (n, 7) of the arm."""
+        return self._checker.first_collision(self._whole(path), self._fingers)
+
+    def distances(self, path: Array, count: int) -> tuple[Array, Array]:
+        """The smallest distances (n, count) of bodies along a path (n, 7), and gradients."""
+        values, gradients = self._checker.distances(self._whole(path), self._fingers, count)
+        return values, gradients[..., self._joints]
+
+    def _whole(self, path: Array) -> Array:
         q = np.tile(self._q, (len(path), 1))
         q[:, self._joints] = path
-        return self._checker.first_collision(q, self._fingers)
+        return q
 
 
 class LevelSpace:

@@ -9,8 +9,9 @@ another, is tilted), ``height <box>`` (it floats above or sinks into its support
 (the centre of mass of the box and all it carries is not above its support), ``rigid <box>`` (it
 moves relative to what holds or supports it); and along a path also ``jump <joint>``,
 ``velocity <joint>``, ``acceleration <joint>``, ``fingers <gripper>`` (not closed on the box they
-carry), ``start`` (not with both arms at their side), ``attachments`` (not those of the skeleton),
-``samples`` (of impossible shape or order) and ``joint names`` (an arm or finger joint is missing).
+carry), ``start`` (not with both arms at their side), ``skeleton`` (an action is not applicable),
+``attachments`` (not those of the skeleton), ``samples`` (of impossible shape or order) and
+``joint names`` (not those of arms and fingers, each once).
 """
 
 from guided_lgp.nlp.verify.geometry import Violation

@@ -7,8 +7,8 @@ from itertools import pairwise, product, zip_longest
 
 import numpy as np
 
-from guided_lgp.logic import Action, Skeleton, State, successor
-from guided_lgp.nlp.results import Array, Attachment, Trajectory
+from guided_lgp.logic import Action, Skeleton, State, applicable_actions, successor
+from guided_lgp.nlp.results import JOINT_NAMES, Array, Attachment, Trajectory
 from guided_lgp.nlp.verify.geometry import (
     CARRY_ANGLE,
     Violation,
@@ -39,10 +39,12 @@ AT_REST = 1e-3
 """How far (rad) the joints of an arm move at most while its fingers open or close."""
 _HAND_RADIUS = 0.12
 """Reach (m) of the open hand beyond its tool frame, sideways."""
+_LINK_RADIUS = 0.12
+"""Reach (m) of the upper arm and the forearm beyond their axes."""
+_COARSE_STEP = 0.02
+"""Longest way (m), by the levers' bound, between samples at which ways are measured."""
 _FINGER_LEVER = 0.10
 _CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)))
-
-_FINGERS = tuple(joint for gripper in GRIPPERS for joint in pr2.FINGER_JOINTS[gripper])
 
 
 @dataclass(frozen=True)
@@ -71,10 +73,10 @@ def verify_path(world: World, skeleton: Skeleton, trajectory: Trajectory) -> Pat
         skeleton: the actions that the motion carries out.
         trajectory: lists all arm and finger joints.
     """
-    switches = switches_of(world.scene.state, skeleton, trajectory)
+    switches = switches_of(world.scene, skeleton, trajectory)
     if isinstance(switches, Violation):
         return PathReport(switches)
-    columns = [trajectory.joint_names.index(name) for name in (*pr2.ARM_JOINTS, *_FINGERS)]
+    columns = [trajectory.joint_names.index(name) for name in JOINT_NAMES]
     q = trajectory.q[:, columns]
     fault = _rate_faults(q, trajectory.times) or _finger_faults(
         world.scene, skeleton, switches, q, trajectory.times
@@ -87,24 +89,29 @@ def verify_path(world: World, skeleton: Skeleton, trajectory: Trajectory) -> Pat
     return _walk(world, skeleton, switches, q, trajectory.times)
 
 
-def switches_of(state: State, skeleton: Skeleton, trajectory: Trajectory) -> list[int] | Violation:
+def switches_of(scene: Scene, skeleton: Skeleton, trajectory: Trajectory) -> list[int] | Violation:
     """Index into ``times`` of every action's switch, from the attachments.
 
-    A violation instead, if the samples have an impossible shape or order, a joint is missing, or
-    the attachments are not those of the skeleton.
+    A violation instead, if the samples have an impossible shape or order, the joints are not
+    those that move, an action is not applicable, or the attachments are not those of the skeleton.
     """
     rows = len(trajectory.times)
     if (
         trajectory.q.shape != (rows, len(trajectory.joint_names))
         or not np.isfinite(trajectory.q).all()
+        or not np.isfinite(trajectory.times).all()
         or not np.all(np.diff(trajectory.times) > 0)
     ):
         return Violation("samples", 0.0)
-    if not {*pr2.ARM_JOINTS, *_FINGERS} <= set(trajectory.joint_names):
+    if sorted(trajectory.joint_names) != sorted(JOINT_NAMES):
         return Violation("joint names", 0.0)
+    state = scene.state
     held: dict[str, Attachment] = {}
     switches: list[int] = []
     for index, action in enumerate(skeleton):
+        if action not in applicable_actions(state, scene.symbols):
+            return Violation("skeleton", 0.0, index)
+        state = successor(state, action)
         if action.instruction == "grasp":
             later = [
                 attachment
@@ -120,7 +127,7 @@ def switches_of(state: State, skeleton: Skeleton, trajectory: Trajectory) -> lis
             switches.append(held.pop(action.box).end)
     if any(last > then for last, then in pairwise([0, *switches, rows - 1])) or Counter(
         trajectory.attachments
-    ) != Counter(_attachments(state, skeleton, switches, rows)):
+    ) != Counter(_attachments(scene.state, skeleton, switches, rows)):
         return Violation("attachments", 0.0, len(skeleton) - 1)
     return switches
 
@@ -144,7 +151,6 @@ def _attachments(
 
 def _rate_faults(q: Array, times: Array) -> Violation | None:
     """Position, velocity and acceleration limits of the samples (T, 22)."""
-    names = (*pr2.ARM_JOINTS, *_FINGERS)
     lower = np.r_[pr2.JOINT_LIMITS[:, 0], np.full(8, pr2.FINGER_LIMITS[0])]
     upper = np.r_[pr2.JOINT_LIMITS[:, 1], np.full(8, pr2.FINGER_LIMITS[1])]
     limits = np.r_[pr2.VELOCITY_LIMITS, np.full(8, pr2.FINGER_VELOCITY)]
@@ -162,7 +168,7 @@ def _rate_faults(q: Array, times: Array) -> Violation | None:
         if excess.size and excess.max() > 0:
             row = int(np.argmax(excess.max(axis=1) > 0))
             joint = int(np.argmax(excess[row]))
-            constraint = f"{kind} {names[joint]}"
+            constraint = f"{kind} {JOINT_NAMES[joint]}"
             return Violation(constraint, float(excess[row, joint]), time=float(times[row]))
     return None
 
@@ -277,7 +283,7 @@ class _Phase:
         for box, (gripper, grip) in self._grips.items():
             corners = apply(grip, np.array(sizes[box]) / 2 * _CORNERS)
             reach[gripper] = max(reach[gripper], float(np.linalg.norm(corners, axis=1).max()))
-        self.q, self.times = _resample(q, times, [reach[gripper] for gripper in GRIPPERS])
+        self.q, self.times = resample(scene, q, times, [reach[gripper] for gripper in GRIPPERS])
         self._tools = pr2.tool_poses(scene, self.q[:, :14])
         self._moving = {
             box: compose(self._tools[gripper], grip) for box, (gripper, grip) in self._grips.items()
@@ -320,20 +326,55 @@ class _Phase:
         return None
 
 
-def _resample(q: Array, times: Array, reach: Sequence[float]) -> tuple[Array, Array]:
-    """Walk along samples (T, 22) so that no point moves more than ``STEP`` between two.
+def resample(scene: Scene, q: Array, times: Array, reach: Sequence[float]) -> tuple[Array, Array]:
+    """Walk along samples so that no point of robot or load moves more than ``STEP`` between two.
 
-    ``reach`` is how far (m) what each hand holds extends beyond its tool frame. A point moves by
-    at most the sum over the joints of lever times angle.
+    Args:
+        scene: gives the base and the torso.
+        q: (T, 22) both arms and all fingers (rad).
+        times: (T,) s.
+        reach: how far (m) each hand and its load extend beyond the tool frame.
+
+    Returns:
+        the new samples (n, 22) and their times (n,).
     """
     turns = np.abs(np.diff(q, axis=0))
-    ways = [
-        turns[:, arm] @ (pr2.LEVER[arm] + beyond) + _FINGER_LEVER * turns[:, 14:].max(axis=1)
-        for arm, beyond in zip(map(pr2.arm_slice, GRIPPERS), reach, strict=True)
+    arms = list(map(pr2.arm_slice, GRIPPERS))
+    bounds = [
+        turns[:, arm] @ (pr2.LEVER[arm] + beyond) for arm, beyond in zip(arms, reach, strict=True)
     ]
-    way = np.r_[0.0, np.cumsum(np.max(ways, axis=0))]
-    marks = np.linspace(0.0, way[-1], int(np.ceil(way[-1] / STEP)) + 1)
-    columns = [np.interp(marks, way, column) for column in (*q.T, times)]
-    fine = np.stack(columns, axis=1)
-    fine[0], fine[-1] = np.r_[q[0], times[0]], np.r_[q[-1], times[-1]]
-    return fine[:, :-1], fine[:, -1]
+    samples = np.column_stack([q, times])
+    samples = _at_steps(samples, np.max(bounds, axis=0), _COARSE_STEP)
+    fingers = _FINGER_LEVER * np.abs(np.diff(samples[:, 14:22], axis=0)).max(axis=1)
+    ways = [
+        _longest_ways(scene, samples[:, :14], gripper, beyond)
+        for gripper, beyond in zip(GRIPPERS, reach, strict=True)
+    ]
+    samples = _at_steps(samples, np.max(ways, axis=0) + fingers, STEP)
+    return samples[:, :-1], samples[:, -1]
+
+
+def _longest_ways(scene: Scene, q: Array, gripper: str, reach: float) -> Array:
+    """How far (T - 1,) any point of one arm or its load goes at most between samples (T, 14)."""
+    if not np.ptp(q[:, pr2.arm_slice(gripper)], axis=0).any():
+        return np.zeros(len(q) - 1)
+    poses = pr2.link_poses(scene, q, _frames(gripper))
+    shifts = np.linalg.norm(np.diff(poses[..., :3], axis=0), axis=-1)
+    cosines = np.abs(np.sum(poses[1:, :, 3:] * poses[:-1, :, 3:], axis=-1))
+    angles = 2 * np.arccos(np.minimum(cosines, 1.0))
+    return np.asarray((shifts + angles * (_LINK_RADIUS, _LINK_RADIUS, reach)).max(axis=1))
+
+
+def _frames(gripper: str) -> tuple[str, str, str]:
+    """Elbow, wrist and tool: the ends of upper arm, forearm and hand."""
+    side = pr2.SIDE[gripper]
+    return f"{side}_elbow_flex_link", f"{side}_wrist_flex_link", pr2.TOOL_LINK[gripper]
+
+
+def _at_steps(samples: Array, ways: Array, step: float) -> Array:
+    """The polyline (T, d) anew, at equal steps of at most ``step`` along ways (T - 1,)."""
+    way = np.r_[0.0, np.cumsum(ways)]
+    marks = np.linspace(0.0, way[-1], int(np.ceil(way[-1] / step)) + 1)
+    fine = np.stack([np.interp(marks, way, column) for column in samples.T], axis=1)
+    fine[0], fine[-1] = samples[0], samples[-1]
+    return fine
