@@ -1,36 +1,82 @@
-"""All benchmarks, as ``make bench`` runs them: writes their figures to ``reports/metrics``.
+"""All benchmarks, as ``make bench`` runs them.
 
-python benchmarks/run.py [sequences per length of the geometry, 100 by default]
+Writes ``geometry.json`` and ``benchmark.json`` to ``reports/metrics``, after every part, and
+``docs/benchmarks.md`` from the latter:
+
+    python benchmarks/run.py [--count N] [PART ...]
+
+With parts named, the figures of the others stay.
 """
 
+import argparse
 import logging
-import sys
+import os
+import platform
+from collections.abc import Callable
+from functools import partial
+from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import coarse
 import path
+import pipeline
 import search
-from guided_lgp.documents import write_json
+from guided_lgp.documents import read_json, write_json
 from guided_lgp.paths import METRICS
+from guided_lgp.report.benchmarks import PAGE, benchmark_page
 
 ROOT = Path(__file__).parents[1]
+PACKAGES = ("casadi", "pybullet", "pin", "coal", "ompl", "toppra", "numpy", "torch")
 logger = logging.getLogger("benchmarks")
 
 
-def main(count: int) -> None:
-    logger.info("coarse bound: %d sequences per length", count)
-    keyframes = coarse.measure(count)
-    against = {length: figures.pop("ipopt") for length, figures in keyframes.items()}
-    logger.info("path bound: %d sequences per length", count)
-    motions = path.measure(count)
-    geometry = {length: {**figures, **motions[length]} for length, figures in keyframes.items()}
+def machine() -> dict[str, Any]:
+    """What the figures were measured on."""
+    lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    names = [line.split(": ")[1] for line in lines if line.startswith("model name")]
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30
+    return {
+        "cpu": names[0] if names else platform.machine(),
+        "cores": os.cpu_count(),
+        "memory_gb": round(memory, 1),
+        "system": f"{platform.system()} {platform.release()}",
+        "python": platform.python_version(),
+        "packages": {name: version(name) for name in PACKAGES},
+    }
+
+
+def main(parts: list[str], count: int) -> None:
+    measures: dict[str, Callable[[], Any]] = {
+        "coarse_bound": partial(coarse.measure, count),
+        "path_bound": partial(path.measure, count),
+        "enumeration": pipeline.enumeration,
+        "planners": pipeline.planners,
+        "search": partial(search.measure, ROOT),
+        "training": pipeline.training,
+        "memory": pipeline.memory,
+    }
+    target = ROOT / METRICS / "benchmark.json"
+    figures = read_json(target, "an earlier run of all parts") if parts else {}
+    figures["machine"] = machine()
+    for name in parts or measures:
+        logger.info(name)
+        figures[name] = measures[name]()
+        write_json(target, figures)
+    geometry: dict[str, dict[str, Any]] = {}
+    for bound in ("coarse_bound", "path_bound"):
+        for length, row in figures.get(bound, {}).items():
+            plain = {key: value for key, value in row.items() if key != "ipopt"}
+            geometry[length] = geometry.get(length, {}) | plain
     write_json(ROOT / METRICS / "geometry.json", geometry)
-    logger.info("planners")
-    figures = {"coarse_against_ipopt": against, **search.measure(ROOT)}
-    write_json(ROOT / METRICS / "benchmark.json", figures)
-    logger.info("written: geometry.json, benchmark.json in %s", METRICS)
+    (ROOT / PAGE).write_text(benchmark_page(figures), encoding="utf-8")
+    logger.info("written: geometry.json, benchmark.json in %s, and %s", METRICS, PAGE)
 
 
 if __name__ == "__main__":
     logging.basicConfig(format="%(message)s", level=logging.INFO)
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 100)
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("parts", nargs="*", help="those to measure again, all by default")
+    parser.add_argument("--count", type=int, default=100, help="sequences per length")
+    arguments = parser.parse_args()
+    main(arguments.parts, arguments.count)

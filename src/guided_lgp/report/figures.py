@@ -253,11 +253,11 @@ def success(problems: pd.DataFrame) -> Figure:
     """
     planners = [name for name in VARIANTS if name in set(problems["planner"])]
     policies = list(dict.fromkeys(VARIANTS[name].policy for name in planners))
-    searches = list(dict.fromkeys(VARIANTS[name].search for name in planners))
+    rows_of = [[n for n in planners if VARIANTS[n].policy == policy] for policy in policies]
     kinds = sorted(set(problems["kind"]), key=lambda kind: (kind.count("+"), kind))
     figure, axes = _subplots(
         len(policies),
-        len(searches),
+        max(map(len, rows_of)),
         PAGE,
         0.6 + len(policies) * (0.3 + 0.16 * len(kinds)),
         sharey=True,
@@ -267,7 +267,9 @@ def success(problems: pd.DataFrame) -> Figure:
         axis.set_visible(False)
     for planner in planners:
         variant = VARIANTS[planner]
-        axis = axes[policies.index(variant.policy)][searches.index(variant.search)]
+        number = policies.index(variant.policy)
+        place = rows_of[number].index(planner)
+        axis = axes[number][place]
         axis.set_visible(True)
         rows = problems[problems["planner"] == planner]
         shares = pd.crosstab(rows["kind"], rows["outcome"], normalize="index")
@@ -288,8 +290,7 @@ def success(problems: pd.DataFrame) -> Figure:
         axis.set_yticks(
             range(len(kinds)), [f"{kind} (n = {counts.get(kind, 0)})" for kind in kinds]
         )
-        first = next(name for name in planners if VARIANTS[name].policy == variant.policy)
-        axis.tick_params(labelbottom=True, labelleft=planner == first)
+        axis.tick_params(labelbottom=True, labelleft=place == 0)
         axis.set_xlim(0, 100)
         axis.grid(axis="y", visible=False)
     axes[0][0].invert_yaxis()

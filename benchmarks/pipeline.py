@@ -1,0 +1,137 @@
+"""Benchmark of the pipeline: rivals of guided search, enumeration by workers, training, memory.
+
+The planners need the scenes and models of a pipeline run, the rest nothing:
+python benchmarks/pipeline.py
+"""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from shutil import copy
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+import yaml
+
+from guided_lgp import parallel
+from guided_lgp.experiments import compare_scalability, enumerate_sequences
+from guided_lgp.experiments.problems import PROBLEMS
+from guided_lgp.params import load_params
+from guided_lgp.paths import PARAMS, SCENES, TRAINED
+from guided_lgp.policy.training import fit
+from guided_lgp.scene import generate, load_scenes
+
+ROOT = Path(__file__).parents[1]
+SEED = 20_002
+"""Of scenes and samples; no stage of the pipeline uses it."""
+CONFIGURATIONS = 8
+SAMPLES, INPUTS, EPOCHS = 90_000, 41, 5
+
+
+def planners() -> dict[str, Any]:
+    """Every planner of Table III on the first configuration of each problem: means over solved."""
+    params = load_params(ROOT / PARAMS)
+    tasks = [
+        compare_scalability.Task(
+            problem.name,
+            load_scenes(ROOT / SCENES / f"scalability_{problem.setup}.json").scenes[0],
+            params.bounds,
+            params.compare_scalability,
+            ROOT / TRAINED,
+        )
+        for problem in reversed(PROBLEMS)  # the longest first
+    ]
+    parts = parallel.run(compare_scalability.compare, tasks, params.parallel, "planners")
+    rows = [row for part in reversed(parts) for row in part]
+    sizes = compare_scalability.summarize(rows)
+    times = compare_scalability.summarize_times(rows)
+    return {
+        problem.name: {
+            planner: cell | times[problem.name][planner]
+            for planner, cell in sizes[problem.name].items()
+        }
+        for problem in PROBLEMS
+    }
+
+
+def enumeration() -> dict[str, float]:
+    """Verified verdicts per second by number of workers, their start included."""
+    params = load_params(ROOT / PARAMS)
+    scenes = generate("a", CONFIGURATIONS, SEED, "bench").scenes
+    speeds = {}
+    for workers in range(1, (os.cpu_count() or 1) + 1):
+        with tempfile.TemporaryDirectory() as folder:
+            tasks = [
+                enumerate_sequences.Task(
+                    scene, params.bounds, params.enumerate_sequences, Path(folder)
+                )
+                for scene in scenes
+            ]
+            settings = params.parallel.model_copy(update={"workers": workers})
+            began = time.perf_counter()
+            parallel.run(
+                enumerate_sequences.write_shard, tasks, settings, f"enumeration, {workers} workers"
+            )
+            elapsed = time.perf_counter() - began
+            verdicts = sum(
+                pq.read_metadata(task.shard / "verdicts.parquet").num_rows for task in tasks
+            )
+        speeds[str(workers)] = verdicts / elapsed
+    return speeds
+
+
+def training() -> dict[str, float]:
+    """Training samples per second of each network of Table IV: one sub-policy on one core."""
+    params = load_params(ROOT / PARAMS)
+    rng = np.random.default_rng(SEED)
+    inputs = rng.standard_normal((SAMPLES, INPUTS)).astype(np.float32)
+    classes = rng.integers(0, 3, SAMPLES)
+    speeds = {}
+    for network in ("instruction", "grasp", "place"):
+        settings = getattr(params.train_policy, network).model_copy(update={"epochs": EPOCHS})
+        began = time.perf_counter()
+        fit(
+            (inputs, classes),
+            (inputs[:1000], classes[:1000]),
+            3,
+            settings,
+            EPOCHS,
+            np.random.SeedSequence(SEED),
+        )
+        speeds[network] = SAMPLES * EPOCHS / (time.perf_counter() - began)
+    return speeds
+
+
+def memory() -> dict[str, float]:
+    """Peak resident memory (MB) of the largest process of each stage, in the small profile."""
+    stages = yaml.safe_load((ROOT / "dvc.yaml").read_text(encoding="utf-8"))["stages"]
+    peaks = {}
+    with tempfile.TemporaryDirectory() as folder:
+        copy(ROOT / "tests" / PARAMS, Path(folder) / PARAMS)
+        uri = f"sqlite:///{folder}/mlflow.db"
+        for stage, entry in stages.items():
+            for network in entry.get("matrix", {}).get("network", [None]):
+                command = [sys.executable, str(ROOT / "stages" / f"{stage}.py")]
+                process = subprocess.Popen(
+                    [*command, network] if network else command,
+                    cwd=folder,
+                    env=os.environ | {"MLFLOW_TRACKING_URI": uri},
+                )
+                _, status, usage = os.wait4(process.pid, 0)
+                if status:
+                    raise RuntimeError(f"stage {stage} failed")
+                peaks[stage] = max(peaks.get(stage, 0.0), usage.ru_maxrss / 1024)
+    return peaks
+
+
+if __name__ == "__main__":
+    parts = {"planners": planners, "enumeration": enumeration}
+    parts |= {"training": training, "memory": memory}
+    chosen = sys.argv[1:] or list(parts)
+    json.dump({name: parts[name]() for name in chosen}, sys.stdout, indent=1)
+    sys.stdout.write("\n")

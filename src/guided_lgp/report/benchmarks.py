@@ -1,0 +1,180 @@
+"""The page ``docs/benchmarks.md``, from what ``make bench`` measured."""
+
+from pathlib import Path
+from typing import Any
+
+from guided_lgp.experiments.problems import PROBLEMS
+from guided_lgp.report import tables
+from guided_lgp.report.inputs import Metrics
+from guided_lgp.report.style import NETWORKS, PLANNERS, RIVALS
+from guided_lgp.report.table import Table
+from guided_lgp.report.tables import NONE, number, percent, search_time
+
+PAGE = Path("docs/benchmarks.md")
+
+_GUIDED = ("guided_best_first", "relational")
+"""Whose time the rivals' is divided by."""
+
+
+def benchmark_page(figures: Metrics) -> str:
+    """The benchmarks as a Markdown page.
+
+    Args:
+        figures: the content of ``benchmark.json``; parts may be missing.
+    """
+    parts = {
+        "coarse_bound": _coarse,
+        "path_bound": _path,
+        "enumeration": _enumeration,
+        "planners": _planners,
+        "training": _training,
+        "memory": _memory,
+    }
+    shown = [build(figures[name]).markdown() for name, build in parts.items() if name in figures]
+    return "\n".join(["# Benchmarks", "", _machine(figures["machine"]), "", *shown])
+
+
+def _machine(machine: Metrics) -> str:
+    packages = ", ".join(f"{name} {version}" for name, version in machine["packages"].items())
+    return (
+        "Generated from `reports/metrics/benchmark.json`, which `make bench` writes in one run on "
+        f"one machine: {machine['cpu']}, {machine['cores']} cores, {machine['memory_gb']} GB, "
+        f"{machine['system']}, Python {machine['python']}, {packages}."
+    )
+
+
+def _coarse(metrics: Metrics) -> Table:
+    rows: list[tuple[str, ...]] = []
+    for length, row in metrics.items():
+        ipopt = row["ipopt"]
+        ratios = [f"times_faster_than_ipopt_{kind}" for kind in ("feasible", "optimum")]
+        rows.append(
+            (
+                length,
+                number(row["coarse_median_ms"], 2),
+                percent(row["coarse_first_try"]),
+                percent(row["false_infeasible"]),
+                number(ipopt["solver_median_ms"], 2),
+                number(ipopt["ipopt_feasible_median_ms"]),
+                number(ipopt["ipopt_optimum_median_ms"]),
+                *(f"{number(ipopt[ratio])}×" for ratio in ratios),
+                str(row["n"]),
+                str(ipopt["n"]),
+            )
+        )
+    return Table(
+        "coarse_bound",
+        "Coarse bound, and IPOPT on the same programs from the same starts",
+        (
+            "K",
+            "one start (ms)",
+            "first start solves",
+            "not found",
+            "our solver (ms)",
+            "IPOPT, feasible (ms)",
+            "IPOPT, optimum (ms)",
+            "faster than IPOPT, feasible",
+            "faster than IPOPT, optimum",
+            "n",
+            "n for IPOPT",
+        ),
+        tuple(rows),
+        (
+            "Medians on one core. One start: from skeleton and prefix to the end of the first "
+            "start, the prefix's solution known. Not found: coarse-feasible within 40 starts, but "
+            "not within the default ones. Our solver stops at a feasible point, which is what the "
+            "bound asks for; IPOPT is run to a feasible point, and to a local optimum. The time to "
+            "build IPOPT's programs is left out.",
+        ),
+    )
+
+
+def _path(metrics: Metrics) -> Table:
+    rows = tuple(
+        (
+            length,
+            percent(row["path_verified_share"]),
+            number(row["path_median_s"], 2),
+            number(row["path_max_s"], 1),
+            percent(row["physics_success_share"]),
+            str(row["n"]),
+        )
+        for length, row in metrics.items()
+    )
+    return Table(
+        "path_bound",
+        "Path bound with its verification",
+        ("K", "verified path", "median (s)", "longest (s)", "goals hold after execution", "n"),
+        rows,
+        ("Random coarse-feasible sequences of setup a; one core each.",),
+    )
+
+
+def _enumeration(metrics: Metrics) -> Table:
+    single = metrics["1"]
+    return Table(
+        "enumeration",
+        "Enumeration: verified verdicts of the coarse bound per second",
+        ("Workers", "verdicts per second", "against one worker"),
+        tuple(
+            (n, number(speed, 0), f"{number(speed / single, 2)}×") for n, speed in metrics.items()
+        ),
+        ("Setup a; the start of the workers is included.",),
+    )
+
+
+def _planners(metrics: Metrics) -> Table:
+    rows = []
+    for problem in PROBLEMS:
+        cells = metrics.get(problem.name)
+        if cells is None:
+            continue
+        bases = {planner: search_time(cells[planner]) for planner in _GUIDED}
+        row = [tables.label(problem), str(problem.k_min)]
+        row += [f"{number(bases[planner], 3)}{_partial(cells[planner])}" for planner in _GUIDED]
+        for rival in RIVALS:
+            theirs = search_time(cells[rival])
+            row += [_ratio(theirs, bases[planner]) + _partial(cells[rival]) for planner in _GUIDED]
+        rows.append(tuple(row))
+    names = [PLANNERS[planner] for planner in _GUIDED]
+    return Table(
+        "planners",
+        "Guided search against each rival: time without the path bound",
+        ("Problem", "K", *(f"{name} (s)" for name in names), *names * len(RIVALS)),
+        tuple(rows),
+        (
+            "Means over the objectives solved in one configuration per problem, symbolic, policy "
+            "and coarse time. A rival's figure is its time divided by the guided planner's: above "
+            f"1, guided search is faster. {NONE}: nothing solved. (k/n): k of n solved.",
+        ),
+        (("", 4), *((f"{PLANNERS[rival]} takes, times", 2) for rival in RIVALS)),
+    )
+
+
+def _partial(cell: Metrics) -> str:
+    solved, n = cell["problems_solved"], cell["problems"]
+    return "" if solved == n else f" ({solved}/{n})"
+
+
+def _ratio(theirs: float | None, ours: float | None) -> str:
+    return NONE if theirs is None or not ours else f"{number(theirs / ours)}×"
+
+
+def _training(metrics: Metrics) -> Table:
+    return Table(
+        "training",
+        "Training: samples per second of one sub-policy on one core",
+        tuple(NETWORKS[network] for network in metrics),
+        (tuple(number(speed, 0) for speed in metrics.values()),),
+        labels=0,
+    )
+
+
+def _memory(metrics: dict[str, Any]) -> Table:
+    return Table(
+        "memory",
+        "Peak memory of each stage (MB)",
+        ("Stage", "largest process"),
+        tuple((stage, number(peak, 0)) for stage, peak in metrics.items()),
+        ("Resident memory, libraries included, in the small profile (tests/params.yaml).",),
+    )

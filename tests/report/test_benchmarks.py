@@ -1,0 +1,70 @@
+from pathlib import Path
+
+from guided_lgp.documents import read_json
+from guided_lgp.paths import METRICS
+from guided_lgp.report.benchmarks import PAGE, benchmark_page
+
+ROOT = Path(__file__).parents[2]
+
+MACHINE = {
+    "cpu": "A CPU",
+    "cores": 2,
+    "memory_gb": 8.0,
+    "system": "Linux 6",
+    "python": "3.11.9",
+    "packages": {"casadi": "3.7"},
+}
+
+
+def cell(seconds: float | None, solved: int = 6) -> dict[str, float | int | None]:
+    times = dict.fromkeys(("symbolic_s", "policy_s", "coarse_s"), seconds)
+    return {"problems": 6, "problems_solved": solved} | times
+
+
+def test_every_part_has_a_table_and_ratios_come_from_one_run() -> None:
+    ipopt = {
+        "n": 30,
+        "solver_median_ms": 1.5,
+        "ipopt_feasible_median_ms": 30.0,
+        "ipopt_optimum_median_ms": 45.0,
+        "times_faster_than_ipopt_feasible": 20.0,
+        "times_faster_than_ipopt_optimum": 30.0,
+    }
+    coarse = {"n": 100, "coarse_median_ms": 1.0, "coarse_first_try": 0.8, "false_infeasible": 0.01}
+    motion = {"n": 100, "path_verified_share": 0.99, "path_median_s": 0.4, "path_max_s": 3.0}
+    planners = {
+        "breadth_first": cell(None, solved=0),
+        "breadth_first_graph": cell(0.5),
+        "astar": cell(0.1, solved=5),
+        "guided_best_first": cell(0.2),
+        "relational": cell(0.05),
+    }
+    page = benchmark_page(
+        {
+            "machine": MACHINE,
+            "coarse_bound": {"4": coarse | {"ipopt": ipopt}},
+            "path_bound": {"4": motion | {"physics_success_share": 0.98}},
+            "enumeration": {"1": 80.0, "2": 150.0},
+            "planners": {"c.1": planners},
+            "training": {"instruction": 123_456.0},
+            "memory": {"generate_scenes": 210.0},
+        }
+    )
+    assert "A CPU, 2 cores, 8.0 GB" in page
+    assert page.count("\n**") == 6
+    lines = page.splitlines()
+    row = next(line for line in lines if line.startswith(r"| c.1\*"))
+    assert [text.strip() for text in row.strip("|").split("|")] == [
+        *(r"c.1\*", "8", "0.600", "0.150"),
+        *("– (0/6)", "– (0/6)", "2.5×", "10.0×", "0.5× (5/6)", "2.0× (5/6)"),
+    ]
+    assert any(line.startswith("| 2 | 150 | 1.88×") for line in lines)
+    assert any(line.startswith("| 4 | 1.00 | 80.0% | 1.0% | 1.50 | 30.0") for line in lines)
+
+
+def test_the_page_in_the_docs_is_what_the_figures_render_to() -> None:
+    figures, page = ROOT / METRICS / "benchmark.json", ROOT / PAGE
+    assert figures.exists() == page.exists()
+    if figures.exists():
+        document = read_json(figures, "make bench")
+        assert page.read_text(encoding="utf-8") == benchmark_page(document)
