@@ -3,7 +3,8 @@
 Every planner solves every objective of problems a.1 to e.10 in every configuration of the setup,
 on the same bounds and within the same limits. A verdict of a bound is computed once, and its
 time counts for every planner that asks for it. Planners without a policy get the paper's reduced
-branching in b.1, c.1 and d.1; the guided ones never do.
+branching in b.1, c.1 and d.1; the guided ones never do. The maximum depth is the paper's, which is
+twice the least number of actions of its longest problems, and that also where more are needed.
 """
 
 import logging
@@ -19,8 +20,8 @@ from guided_lgp import parallel
 from guided_lgp.documents import write_json
 from guided_lgp.experiments.files import write_table
 from guided_lgp.experiments.memory import peak_mb, reset_peak
-from guided_lgp.experiments.problems import PROBLEMS
-from guided_lgp.logic import Objective, Symbols, format_objective, format_skeleton
+from guided_lgp.experiments.problems import PROBLEMS, Problem
+from guided_lgp.logic import Objective, format_objective, format_skeleton
 from guided_lgp.nlp.bounds import SceneBounds
 from guided_lgp.params import BoundsParams, Params, SearchLimits
 from guided_lgp.paths import EVALUATION, METRICS, SCENES, TRAINED
@@ -111,7 +112,7 @@ def compare(task: Task) -> list[Row]:
     problem = next(problem for problem in PROBLEMS if problem.name == task.problem)
     symbols = task.scene.symbols
     bounds = SceneBounds(task.scene, task.bounds)
-    planners = _planners(symbols, problem.unguided_symbols(symbols), bounds, task)
+    planners = _planners(task, bounds, problem)
     rows = []
     for objective in problem.objectives(symbols.boxes):
         for planner, plan in planners.items():
@@ -131,21 +132,25 @@ def compare(task: Task) -> list[Row]:
 
 
 def _planners(
-    symbols: Symbols, unguided_symbols: Symbols, bounds: Bounds, task: Task
+    task: Task, bounds: Bounds, problem: Problem
 ) -> dict[str, Callable[[Objective], SearchResult]]:
     """Every planner, by name, as a function of the objective alone."""
+    symbols = task.scene.symbols
+    unguided_symbols = problem.unguided_symbols(symbols)
     policies = {name: load_policy(task.models, name) for name in POLICIES}
+    depth = max(task.limits.max_depth, 2 * problem.k_min)
+    limits = task.limits.model_copy(update={"max_depth": depth})
 
-    def guided_by(
+    def by(
         policy: Policy, plan: Callable[..., SearchResult]
     ) -> Callable[[Objective], SearchResult]:
-        return lambda objective: plan(task.scene, objective, symbols, bounds, policy, task.limits)
+        return lambda objective: plan(task.scene, objective, symbols, bounds, policy, limits)
 
-    def unguided(plan: Callable[..., SearchResult]) -> Callable[[Objective], SearchResult]:
-        return lambda objective: plan(task.scene, objective, unguided_symbols, bounds, task.limits)
+    def alone(plan: Callable[..., SearchResult]) -> Callable[[Objective], SearchResult]:
+        return lambda objective: plan(task.scene, objective, unguided_symbols, bounds, limits)
 
-    return {name: guided_by(policies[policy], plan) for name, (policy, plan) in GUIDED.items()} | {
-        name: unguided(plan) for name, plan in UNGUIDED.items()
+    return {name: by(policies[policy], plan) for name, (policy, plan) in GUIDED.items()} | {
+        name: alone(plan) for name, plan in UNGUIDED.items()
     }
 
 
