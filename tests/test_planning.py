@@ -12,7 +12,9 @@ from guided_lgp.explanation import ObservedBounds, Obstacle
 from guided_lgp.logic import Action, Skeleton, State, parse_objective
 from guided_lgp.logic.domain import parse_skeleton
 from guided_lgp.nlp.results import CoarseResult, Failure, PathResult
+from guided_lgp.planning import PlanningResult
 from guided_lgp.policy.inference import POLICIES
+from guided_lgp.search.result import Times
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "examples"
@@ -107,6 +109,28 @@ def test_impossible_tasks_name_the_action_the_constraint_and_the_amount(
     assert str(first) in result.explanation
     assert f"{result.coarse_calls} sequences with {result.solver_starts} starts" in (
         result.explanation
+    )
+
+
+def test_attempts_that_go_in_circles_are_told_apart_from_infeasible_ones() -> None:
+    result = PlanningResult(
+        coarse=None,
+        path=None,
+        tree_size=30,
+        expansions=9,
+        policy_calls=9,
+        coarse_calls=12,
+        path_calls=1,
+        causes=("max_depth", "infeasible", "max_depth"),
+        reattempts={},
+        times=Times(0.0, 0.0, 0.0, 0.0),
+        reason="attempts",
+        solver_starts=40,
+    )
+    assert result.explanation == (
+        "the last allowed attempt failed (30 nodes; attempts: 1 infeasible, 2 without the goals at "
+        "the maximum depth; 12 sequences with 40 starts of the coarse bound, 1 of them on to the "
+        "path bound)"
     )
 
 

@@ -10,18 +10,27 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from guided_lgp import tracking
 from guided_lgp.errors import InputError
-from guided_lgp.mlflow_model import log_network
+from guided_lgp.mlflow_model import log_model
 from guided_lgp.params import Params, load_params
 from guided_lgp.policy.encoding import CHAINS, Encoding
 from guided_lgp.policy.models import Model
+from guided_lgp.policy.relational import model as relational
+from guided_lgp.policy.relational.encoding import Range
+from guided_lgp.policy.relational.model import Weights, shapes
 
 ROOT = Path(__file__).parents[1]
 PARAMS = load_params(ROOT / "params.yaml")
-METRICS = {"accuracy": 0.9, "loss": {"training": [2.0, 1.0, 0.5]}, "note": "text", "nan": None}
+METRICS = {
+    "version": 1,
+    "sub_policies": {"box": {"accuracy": 0.9, "curves": {"loss": [2.0, 1.0, 0.5]}}},
+    "note": "text",
+    "nan": None,
+}
 PIPELINE = """
 stages:
   generate_scenes:
@@ -118,29 +127,49 @@ def test_one_parent_per_execution_and_a_child_per_stage(clone: Path) -> None:
         assert child.data.params["seed_training"] == str(PARAMS.generate_scenes.seed_training)
         assert child.info.status == parent.info.status == "FINISHED"
     assert parent.data.params["train_policy.place.dropout"] == "0.1"
-    assert parent.data.metrics["place.accuracy"] == 0.9
+    assert parent.data.metrics["training/place/box/accuracy"] == 0.9
     assert first.data.tags[tracking.KEY_TAG] == second.data.tags[tracking.KEY_TAG]
 
 
 def test_metrics_curves_and_files_are_recorded(clone: Path) -> None:
     record()
     (child,) = children()
-    assert child.data.metrics == {"accuracy": 0.9, "loss.training": 0.5}
+    assert child.data.metrics == {"box/accuracy": 0.9, "box/loss": 0.5}
     client = tracking.prepare()
-    curve = client.get_metric_history(child.info.run_id, "loss.training")
+    curve = client.get_metric_history(child.info.run_id, "box/loss")
     assert [(point.step, point.value) for point in curve] == [(0, 2.0), (1, 1.0), (2, 0.5)]
     listings = [client.list_artifacts(child.info.run_id, folder) for folder in (None, "training")]
     files = [item.path for listing in listings for item in listing]
     assert files == ["report.md", "training", "training/place.json"]
 
 
-def test_networks_can_be_loaded_from_mlflow(
-    tmp_path: Path, database: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    import mlflow
-
+@pytest.fixture
+def experiment(tmp_path: Path, database: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """An experiment in a database of its own."""
     shutil.copy(database, tmp_path / "mlflow.db")
     monkeypatch.setenv("MLFLOW_TRACKING_URI", f"sqlite:///{tmp_path / 'mlflow.db'}")
+    found: str = tracking.prepare().get_experiment_by_name(tracking.EXPERIMENT).experiment_id
+    return found
+
+
+def logged_and_loaded(folder: Path, name: str, experiment: str) -> Any:
+    """A model after it went through MLflow."""
+    import mlflow
+
+    with mlflow.start_run(experiment_id=experiment):
+        log_model(folder, name)
+        (logged,) = mlflow.search_logged_models(
+            experiment_ids=[experiment], filter_string=f"name = '{name}'", output_format="list"
+        )
+    model = mlflow.pyfunc.load_model(logged.model_uri)
+    assert model.metadata.signature is not None
+    assert model.input_example is not None
+    return model
+
+
+def test_networks_can_be_loaded_from_mlflow(tmp_path: Path, experiment: str) -> None:
+    from mlflow.exceptions import MlflowException
+
     encoding = Encoding()
     rng = np.random.default_rng(0)
     sub_policies = {
@@ -153,21 +182,28 @@ def test_networks_can_be_loaded_from_mlflow(
         )
     }
     Model("grasp", encoding, sub_policies, training={}).save(tmp_path / "models")
-    experiment = tracking.prepare().get_experiment_by_name(tracking.EXPERIMENT).experiment_id
-    with mlflow.start_run(experiment_id=experiment):
-        log_network(tmp_path / "models", "grasp")
-        (logged,) = mlflow.search_logged_models(
-            experiment_ids=[experiment], filter_string="name = 'grasp'", output_format="list"
-        )
-    model = mlflow.pyfunc.load_model(logged.model_uri)
-    assert model.metadata.signature is not None
-    assert model.input_example is not None
+    model = logged_and_loaded(tmp_path / "models", "grasp", experiment)
     inputs = rng.normal(size=(4, encoding.chain_inputs("grasp")[0])).astype(np.float32)
     probabilities = model.predict(inputs)
     assert probabilities.shape == (4, 6)
     np.testing.assert_allclose(probabilities.sum(axis=1), 1, rtol=1e-5)
-    with pytest.raises(mlflow.exceptions.MlflowException):
+    with pytest.raises(MlflowException):
         model.predict(inputs[:, :-1])
+
+
+def test_the_relational_policy_can_be_loaded_from_mlflow(tmp_path: Path, experiment: str) -> None:
+    rng = np.random.default_rng(0)
+    tensors = {n: rng.normal(size=s).astype(np.float32) for n, s in shapes(4, 1).items()}
+    weights = Weights(Range(lower=(0.0,) * 3, upper=(1.0,) * 3), tensors)
+    relational.Model(weights, training={}).save(tmp_path / "models")
+    model = logged_and_loaded(tmp_path / "models", "relational", experiment)
+    scene = (ROOT / "examples" / "four_boxes_and_tray.json").read_text()
+    goals = "(on red tray) (held blue)"
+    (answer,) = model.predict(pd.DataFrame([{"scene": scene, "goals": goals}]))
+    actions = json.loads(answer)
+    assert len(actions) == 8
+    assert "(grasp pr2L yellow)" in actions
+    assert sum(actions.values()) == pytest.approx(1)
 
 
 def test_a_failing_stage_is_recorded_as_failed(clone: Path) -> None:
@@ -179,6 +215,26 @@ def test_a_failing_stage_is_recorded_as_failed(clone: Path) -> None:
     parent, child = runs()
     assert child.info.status == parent.info.status == "FAILED"
     assert child.data.tags["error"] == "ZeroDivisionError: no results"
+
+
+def test_killed_stages_are_marked_at_the_next_start(clone: Path) -> None:
+    code = """
+import os, signal
+from pathlib import Path
+from guided_lgp import tracking
+from guided_lgp.params import load_params
+with tracking.recorded("generate_scenes", load_params(Path("params.yaml"))):
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == -9
+    parent, child = runs()
+    assert child.info.status == parent.info.status == "KILLED"
+
+
+def test_running_stages_stay_so(clone: Path) -> None:
+    with tracking.recorded("generate_scenes", PARAMS):
+        parent, child = runs()
+        assert child.info.status == parent.info.status == "RUNNING"
 
 
 def test_tracking_problems_are_warnings(

@@ -1,19 +1,37 @@
-"""A trained network as MLflow loads it: ``mlflow.pyfunc.load_model(uri).predict(inputs)``.
+"""A trained policy as MLflow loads it: ``mlflow.pyfunc.load_model(uri).predict(inputs)``.
 
 MLflow keeps the weights and the name of this module; nothing is pickled.
 """
 
+import json
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from guided_lgp.logic import applicable_actions, parse_objective
 from guided_lgp.policy.encoding import FloatArray
 from guided_lgp.policy.inference import chain_log_probabilities
 from guided_lgp.policy.models import Model, load_model
+from guided_lgp.policy.relational.inference import RelationalPolicy, load_relational
+from guided_lgp.scene import Scene
+from guided_lgp.scene.model import Box, Table, parse_scene
+from guided_lgp.search.observation import observe, start
+
+_RELATIONAL = "relational"
+_SCENE = Scene(
+    name="example",
+    tables=(Table(name="tab1", position=(0.54, 0.33, 0.60), half_extents=(0.17, 0.20)),),
+    boxes=(
+        Box(name="red", size=(0.15, 0.07, 0.10), position=(0.48, 0.22, 0.65), on="tab1"),
+        Box(name="green", size=(0.15, 0.07, 0.10), position=(0.56, 0.42, 0.65), on="tab1"),
+    ),
+)
 
 
 class Network:
-    """Probabilities of a network's decisions."""
+    """Probabilities of the decisions of one network of the hierarchical policy."""
 
     def __init__(self, model: Model) -> None:
         self._chain = tuple(model.sub_policies.values())
@@ -35,33 +53,76 @@ class Network:
         return probabilities
 
 
-def _load_pyfunc(data_path: str) -> Network:
-    """Called by MLflow with the folder that :func:`log_network` has logged."""
+class Relational:
+    """Probabilities of the first actions in a scene, by the relational policy."""
+
+    def __init__(self, policy: RelationalPolicy) -> None:
+        self._policy = policy
+
+    def predict(self, inputs: Mapping[str, Any]) -> list[str]:
+        """Evaluate the policy.
+
+        Args:
+            inputs: a data frame of n rows: ``scene``, the JSON document of a scene, and ``goals``,
+                such as ``(on red green) (held blue)``.
+
+        Returns:
+            n JSON documents: the probability of every applicable action.
+
+        Raises:
+            InputError: a scene or a goal that cannot be read.
+        """
+        return [
+            json.dumps(self._first_actions(parse_scene(json.loads(scene), "scene"), goals))
+            for scene, goals in zip(inputs["scene"], inputs["goals"], strict=True)
+        ]
+
+    def _first_actions(self, scene: Scene, goals: str) -> dict[str, float]:
+        objective = parse_objective([f"{goal.strip()})" for goal in goals.split(")") if goal])
+        actions = list(applicable_actions(scene.state, scene.symbols))
+        positions = observe(scene, start(scene))
+        log_p = self._policy.log_probabilities(objective, scene.state, positions, actions)
+        pairs = zip(actions, np.exp(log_p).tolist(), strict=True)
+        return {str(action): probability for action, probability in pairs}
+
+
+def _load_pyfunc(data_path: str) -> Network | Relational:
+    """Called by MLflow with the folder that :func:`log_model` has logged."""
     (weights,) = Path(data_path).glob("*.safetensors")
+    if weights.stem == _RELATIONAL:
+        return Relational(load_relational(weights.parent))
     return Network(load_model(weights.parent, weights.stem))
 
 
-def log_network(folder: Path, name: str) -> None:
-    """Log a network to the active run, with its signature and an input example.
+def log_model(folder: Path, name: str) -> None:
+    """Log a trained model to the active run, with its signature and an input example.
 
     Args:
         folder: with ``<name>.safetensors`` and ``<name>.json`` alone.
-        name: ``instruction``, ``grasp`` or ``place``.
+        name: ``instruction``, ``grasp``, ``place`` or ``relational``.
     """
     import mlflow
+    import pandas as pd
     from mlflow.models import ModelSignature
-    from mlflow.types import Schema, TensorSpec
+    from mlflow.types import ColSpec, Schema, TensorSpec
 
-    network = Network(load_model(folder, name))
-    real = np.dtype(np.float32)
+    loaded = _load_pyfunc(str(folder))
+    example: Any
+    if isinstance(loaded, Network):
+        real = np.dtype(np.float32)
+        example = np.zeros((2, loaded.inputs), real)
+        inputs = Schema([TensorSpec(real, (-1, loaded.inputs))])
+        outputs = Schema([TensorSpec(real, (-1, loaded.outputs))])
+    else:
+        row = {"scene": _SCENE.model_dump_json(), "goals": "(on red green)"}
+        example = pd.DataFrame([row])
+        inputs = Schema([ColSpec("string", column) for column in row])
+        outputs = Schema([ColSpec("string")])
     mlflow.pyfunc.log_model(
         name=name,
         loader_module=__name__,
         data_path=str(folder),
-        signature=ModelSignature(
-            inputs=Schema([TensorSpec(real, (-1, network.inputs))]),
-            outputs=Schema([TensorSpec(real, (-1, network.outputs))]),
-        ),
-        input_example=np.zeros((2, network.inputs), np.float32),
+        signature=ModelSignature(inputs, outputs),
+        input_example=example,
         pip_requirements=["guided-lgp"],
     )

@@ -1,6 +1,6 @@
 """Plan one task: the Python interface behind ``guided-lgp plan``."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
@@ -15,10 +15,16 @@ from guided_lgp.policy.inference import load_policy
 from guided_lgp.scene import Scene
 from guided_lgp.scene.validate import validate_scene
 from guided_lgp.search import best_first, breadth_first, guided
-from guided_lgp.search.result import REASONS, SearchResult
+from guided_lgp.search.result import REASONS, Cause, SearchResult
 
 Planner = Literal["guided", "best-first", "breadth-first"]
 """Guided LGP of the paper, its complete variant, and the breadth-first baseline."""
+
+_OUTCOMES: Mapping[Cause, str] = {
+    "infeasible": "infeasible",
+    "max_depth": "without the goals at the maximum depth",
+}
+"""How attempts end, in words."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,9 +41,14 @@ class PlanningResult(SearchResult):
         """One line: why there is no plan and what was tried; empty if there is one."""
         if self.reason is None:
             return ""
-        attempts = f"{len(self.causes)} attempts, " if self.causes else ""
+        outcomes = ", ".join(
+            f"{self.causes.count(cause)} {outcome}"
+            for cause, outcome in _OUTCOMES.items()
+            if cause in self.causes
+        )
+        attempts = f"attempts: {outcomes}; " if outcomes else ""
         line = (
-            f"{REASONS[self.reason]} ({self.tree_size} nodes, {attempts}{self.coarse_calls} "
+            f"{REASONS[self.reason]} ({self.tree_size} nodes; {attempts}{self.coarse_calls} "
             f"sequences with {self.solver_starts} starts of the coarse bound, {self.path_calls} of "
             "them on to the path bound)"
         )

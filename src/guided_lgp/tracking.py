@@ -10,6 +10,7 @@ import json
 import logging
 import math
 import os
+import platform
 import shutil
 import subprocess
 import time
@@ -34,6 +35,7 @@ STAGE_TAG = "guided_lgp.stage"
 KEY_TAG = "guided_lgp.key"
 EXECUTION_TAG = "guided_lgp.execution"
 STATE_TAG = "guided_lgp.state"
+PROCESS_TAG = "guided_lgp.process"
 BATCH = 500
 """Metrics per request; MLflow accepts at most 1000."""
 
@@ -86,6 +88,8 @@ def tracking_uri() -> str:
 def prepare() -> Any:
     """Create the database and the experiment, once and before any worker starts.
 
+    Runs whose process is gone, as after ``kill -9``, are marked as killed.
+
     Returns:
         An ``mlflow.MlflowClient``.
     """
@@ -101,6 +105,7 @@ def prepare() -> Any:
         local = uri.startswith("sqlite:///")
         folder = Path(uri.removeprefix("sqlite:///")).resolve().parent / "mlruns"
         client.create_experiment(EXPERIMENT, folder.as_uri() if local else None)
+    _end_killed(client)
     return client
 
 
@@ -163,7 +168,12 @@ class _Run:
         if parent is None:
             parent = _create_parent(client, experiment, params, execution)
         client.update_run(parent, status="RUNNING")
-        tags = {MLFLOW_PARENT_RUN_ID: parent, STAGE_TAG: address, "restored": str(replayed)}
+        tags = {
+            MLFLOW_PARENT_RUN_ID: parent,
+            STAGE_TAG: address,
+            PROCESS_TAG: _process(),
+            "restored": str(replayed),
+        }
         child = client.create_run(experiment, tags=tags, run_name=address)
         run = cls(client, parent, child.info.run_id)
         section = params.model_dump().get(address.partition("@")[0], {})
@@ -185,7 +195,8 @@ class _Run:
         for file in [*read, *reports]:
             if file.parts[0] == "reports" and file.suffix == ".json":
                 scalars = {name: [values[-1]] for name, values in _read_metrics(file).items()}
-                prefixed = {f"{file.stem}.{name}": values for name, values in scalars.items()}
+                group = "/".join(file.with_suffix("").parts[1:]).removeprefix("metrics/")
+                prefixed = {f"{group}/{name}": values for name, values in scalars.items()}
                 _log_metrics(self._client, self._parent, prefixed)
         self._end("FINISHED")
 
@@ -194,14 +205,14 @@ class _Run:
             return
         import mlflow
 
-        from guided_lgp.mlflow_model import log_network
+        from guided_lgp.mlflow_model import log_model
 
         with mlflow.start_run(run_id=self._id, log_system_metrics=False):
             for path in weights:
                 with TemporaryDirectory() as folder:
                     for file in (path, path.with_suffix(".json")):
                         shutil.copy(file, folder)
-                    log_network(Path(folder), path.stem)
+                    log_model(Path(folder), path.stem)
 
     def fail(self, reason: str) -> None:
         """Record why the stage has no results."""
@@ -211,6 +222,28 @@ class _Run:
     def _end(self, status: str) -> None:
         self._client.set_terminated(self._id, status)
         self._client.set_terminated(self._parent, status)
+
+
+def _process() -> str:
+    """Identity of this process among all that have ever run, on any machine."""
+    import psutil
+
+    return f"{platform.node()}:{os.getpid()}:{psutil.Process().create_time():.2f}"
+
+
+def _end_killed(client: Any) -> None:
+    """Mark runs of this machine whose process has ended without a word, and their parents."""
+    import psutil
+
+    for run in _search(client, f"tags.`{PROCESS_TAG}` != '' and status = 'RUNNING'"):
+        node, pid, created = run.data.tags[PROCESS_TAG].rsplit(":", 2)
+        try:
+            gone = f"{psutil.Process(int(pid)).create_time():.2f}" != created
+        except psutil.NoSuchProcess:
+            gone = True
+        if gone and node == platform.node():
+            client.set_terminated(run.info.run_id, "KILLED")
+            client.set_terminated(run.data.tags["mlflow.parentRunId"], "KILLED")
 
 
 def _create_parent(client: Any, experiment: str, params: Params, execution: str) -> str:
@@ -247,26 +280,28 @@ def _log_metrics(client: Any, run_id: str, metrics: Mapping[str, list[float]]) -
         client.log_batch(run_id, metrics=points[first : first + BATCH])
 
 
-def flatten(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Nested mappings as one level, with dotted names."""
+def flatten(values: Mapping[str, Any], separator: str = ".", prefix: str = "") -> dict[str, Any]:
+    """Nested mappings as one level, the names of the levels joined by a separator."""
     flat: dict[str, Any] = {}
     for name, value in values.items():
         if isinstance(value, Mapping):
-            flat |= flatten(value, f"{prefix}{name}.")
+            flat |= flatten(value, separator, f"{prefix}{name}{separator}")
         else:
             flat[f"{prefix}{name}"] = value
     return flat
 
 
 def _read_metrics(file: Path) -> dict[str, list[float]]:
-    """The numbers of a JSON file by dotted name; a list of numbers is a curve over epochs."""
+    """The numbers of a JSON file by name; a list of numbers is a curve over epochs.
+
+    MLflow groups its charts by what stands before the last slash of a name.
+    """
     document = json.loads(file.read_text(encoding="utf-8"))
     metrics = {}
-    for name, value in flatten(document if isinstance(document, dict) else {}).items():
-        if name == "version":
-            continue
+    for path, value in flatten(document if isinstance(document, dict) else {}, "/").items():
+        name = "/".join(part for part in path.split("/") if part not in ("sub_policies", "curves"))
         values = value if isinstance(value, list) else [value]
-        if values and all(_is_number(item) for item in values):
+        if name != "version" and values and all(_is_number(item) for item in values):
             metrics[name] = [float(item) for item in values]
     return metrics
 
@@ -285,24 +320,26 @@ def _files(path: Path) -> list[Path]:
     return [path] if path.is_file() else []
 
 
-def _find(client: Any, condition: str) -> str | None:
+def _search(client: Any, condition: str) -> Iterator[Any]:
+    """Every run that meets a condition, latest first."""
     experiment = client.get_experiment_by_name(EXPERIMENT).experiment_id
-    runs = client.search_runs([experiment], condition, max_results=1)
-    return runs[0].info.run_id if runs else None
+    token = None
+    while True:
+        page = client.search_runs([experiment], condition, page_token=token)
+        yield from page
+        token = page.token
+        if not token:
+            return
+
+
+def _find(client: Any, condition: str) -> str | None:
+    run = next(_search(client, condition), None)
+    return run.info.run_id if run else None
 
 
 def _recorded_keys(client: Any) -> set[str]:
-    experiment = client.get_experiment_by_name(EXPERIMENT).experiment_id
-    keys: set[str] = set()
-    token = None
-    while True:
-        page = client.search_runs(
-            [experiment], f"tags.`{KEY_TAG}` != '' and status = 'FINISHED'", page_token=token
-        )
-        keys.update(run.data.tags[KEY_TAG] for run in page)
-        token = page.token
-        if not token:
-            return keys
+    finished = _search(client, f"tags.`{KEY_TAG}` != '' and status = 'FINISHED'")
+    return {run.data.tags[KEY_TAG] for run in finished}
 
 
 def _execution() -> str:
