@@ -20,9 +20,14 @@ from guided_lgp.policy.encoding import FloatArray
 NO_GOAL = -1
 GOAL_HELD = -2
 
+SETTLED = "settled: stands where it may stay, and so does all below it"
+CARRIES = "carries a box"
+CARRIES_ABOVE = "carries, directly or through others"
+SHALL_STAND_ON = "shall stand on"
+
 NODE_FEATURES = (
     "x",
-    "y towards the gripper's side",
+    "y, on the other side",
     "z",
     "held by the gripper",
     "held by another gripper",
@@ -30,26 +35,21 @@ NODE_FEATURES = (
     "goal: be held",
     "goal: stand elsewhere",
     "goal: holds",
-    "settled: stands where it may stay, and so does all below it",
-    "carries a box",
+    SETTLED,
+    CARRIES,
     "carries, directly or through others, a box with an open goal",
     "gripper is free",
     "another gripper is free",
 )
 """Inputs of every node; the last two are the same for all nodes of a graph."""
 
-CARRIES = "carries, directly or through others"
-
 EDGE_FEATURES = (
     "stands on",
     "carries",
     "stands on, directly or through others",
-    CARRIES,
-    "shall stand on",
+    CARRIES_ABOVE,
+    SHALL_STAND_ON,
     "shall carry",
-    "relative x",
-    "relative y",
-    "relative z",
 )
 """Inputs of every ordered pair of nodes, from the first one's point of view."""
 
@@ -92,7 +92,11 @@ class Graphs:
 
 @dataclass(frozen=True)
 class Range:
-    """Smallest and largest x, y (on the gripper's side) and z in m of what stands, in training."""
+    """Smallest and largest x, y and z in m that make a difference.
+
+    Those of what stands in training; but on its own side a gripper reaches what it reaches in the
+    middle, so that y, which is positive there, ends at 0.
+    """
 
     lower: tuple[float, ...]
     upper: tuple[float, ...]
@@ -103,8 +107,9 @@ class Range:
         surfaces = situations.positions.shape[1] - situations.supports.shape[1]
         standing = np.pad(situations.supports >= 0, ((0, 0), (surfaces, 0)), constant_values=True)
         found = situations.positions[standing]
-        both = np.concatenate([found, found * np.array([1, -1, 1], dtype=np.float32)])
-        return cls(tuple(both.min(axis=0).tolist()), tuple(both.max(axis=0).tolist()))
+        lower, upper = found.min(axis=0), found.max(axis=0)
+        lower[1], upper[1] = min(lower[1], -upper[1]), 0
+        return cls(tuple(lower.tolist()), tuple(upper.tolist()))
 
     def scaled(self, positions: FloatArray) -> FloatArray:
         """Positions (..., 3) as numbers from -1 to 1."""
@@ -170,7 +175,6 @@ def graphs(situations: Situations, limits: Range) -> Graphs:
         _any(carried, of_tables(goal_open)),
     ]
     by_gripper = []
-    relative = []
     for gripper, side in enumerate(SIDES):
         mirror = np.array([1, side, 1], dtype=np.float32)
         position = limits.scaled(situations.positions * mirror)
@@ -181,14 +185,12 @@ def graphs(situations: Situations, limits: Range) -> Graphs:
         hands = [of_tables(holder[:, gripper]), of_tables(by_other)]
         flags = np.stack([*hands, *symbolic, *arms], axis=-1, dtype=np.float32)
         by_gripper.append(np.concatenate([position, flags], axis=-1))
-        relative.append(position[:, None] - position[:, :, None])
     relations = np.stack(
         [on, np.swapaxes(on, 1, 2), above, carried, shall, np.swapaxes(shall, 1, 2)], axis=-1
     )
-    edges = [np.concatenate([relations, part], axis=-1) for part in relative]
     return Graphs(
         nodes=np.stack(by_gripper, axis=1),
-        edges=np.stack(edges, axis=1),
+        edges=np.repeat(relations[:, None], len(SIDES), axis=1),
         held=np.where(free, -1, holder.argmax(axis=2) + tables - boxes),
     )
 
@@ -199,7 +201,7 @@ def applicable(situations: Situations, inputs: Graphs) -> BoolArray:
     graspable = np.zeros((count, 1, tables), dtype=bool)
     graspable[:, 0, tables - situations.supports.shape[1] :] = situations.supports >= 0
     held = inputs.held[..., None]
-    carried = inputs.edges[..., EDGE_FEATURES.index(CARRIES)] > 0
+    carried = inputs.edges[..., EDGE_FEATURES.index(CARRIES_ABOVE)] > 0
     barred = np.take_along_axis(carried, held[..., None], axis=2)[:, :, 0]
     return np.where(held < 0, graspable, ~barred & (np.arange(tables) != held))
 
