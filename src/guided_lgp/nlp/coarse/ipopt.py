@@ -13,7 +13,8 @@ from guided_lgp.nlp.results import Array
 class Ipopt:
     """One program in IPOPT (interior point, exact Hessian, CasADi SX).
 
-    Building it takes far longer than solving it: nothing is shared between programs.
+    With the tolerance and the slack of our solver. Building it takes longer than solving it:
+    nothing is shared between programs.
     """
 
     def __init__(self, program: Program, values: Array, settings: Settings) -> None:
@@ -31,9 +32,10 @@ class Ipopt:
             parameters = program.parameters[program.parameter_start[i] :][: kernel.parameters]
             c = kernel.independent(everything[inputs], ca.SX(parameters))
             rows.append(c)
-            lower += [0.0] * c.numel()
+            lower += [0.0 if kernel.equality else -settings.slack] * c.numel()
             upper += [0.0 if kernel.equality else np.inf] * c.numel()
-        cost = 0.5 * ca.dot(ca.SX(program.weight), (x - ca.SX(program.target)) ** 2)
+        share = ca.SX.sym("share")
+        cost = 0.5 * share * ca.dot(ca.SX(program.weight), (x - ca.SX(program.target)) ** 2)
         options: dict[str, Any] = {
             "print_time": False,
             "ipopt.print_level": 0,
@@ -43,15 +45,21 @@ class Ipopt:
             "ipopt.max_iter": settings.steps,
         }
         self._lower, self._upper = lower, upper
-        self._solver = ca.nlpsol(
-            "oracle", "ipopt", {"x": x, "f": cost, "g": ca.vertcat(*rows)}, options
-        )
+        problem = {"x": x, "p": share, "f": cost, "g": ca.vertcat(*rows)}
+        self._solver = ca.nlpsol("oracle", "ipopt", problem, options)
 
-    def solve(self, values: Array) -> Solution:
-        """Solve from a start: variables first, then constants."""
+    def solve(self, values: Array, optimal: bool = True) -> Solution:
+        """Solve from a start.
+
+        Args:
+            values: variables first, then constants.
+            optimal: go on to a local optimum; otherwise there is no cost and any feasible point
+                is one, as for our solver.
+        """
         program = self._program
         answer = self._solver(
             x0=values[: program.variables],
+            p=float(optimal),
             lbx=program.lower,
             ubx=program.upper,
             lbg=self._lower,
