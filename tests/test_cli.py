@@ -11,7 +11,7 @@ import pytest
 import yaml
 from typer.main import get_command
 
-from guided_lgp import cli
+from guided_lgp import cli, doctor
 from guided_lgp.errors import WorkerError
 
 ROOT = Path(__file__).parents[1]
@@ -256,7 +256,26 @@ def test_doctor_says_how_to_mend(capsys: pytest.CaptureFixture[str]) -> None:
     findings = {finding["name"]: finding for finding in json.loads(capsys.readouterr().out)}
     assert findings["Python"]["ok"]
     assert findings["Robot"]["ok"]
+    assert findings["Cache"]["ok"]
+    assert findings["Policy paper"]["ok"]
     assert all(finding["ok"] or finding["mend"] for finding in findings.values())
+
+
+def test_doctor_finds_damaged_models_and_a_cache_that_cannot_be_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    (tmp_path / "instruction.json").write_text("{")
+    monkeypatch.setattr(doctor, "MODELS", tmp_path)
+    findings = {finding.name: finding for finding in doctor.examine()}
+    assert not findings["Cache"].ok
+    assert "XDG_CACHE_HOME" in findings["Cache"].mend
+    for policy, stage in (("paper", "policy"), ("improved", "improved"), ("relational",) * 2):
+        finding = findings[f"Policy {policy}"]
+        assert not finding.ok
+        assert f"dvc repro train_{stage}" in finding.mend
+    assert "damaged" in findings["Policy paper"].detail
 
 
 def test_the_python_interface_from_the_documentation() -> None:

@@ -5,11 +5,22 @@ import shutil
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
+from tempfile import TemporaryFile
 
+from guided_lgp.errors import InputError
 from guided_lgp.paths import MODELS, SOURCES
+
+_INSTALL = f"pip install -r {SOURCES / 'requirements.lock'}"
+_POLICIES = {
+    "paper": "train_policy",
+    "improved": "train_improved",
+    "relational": "train_relational",
+}
+"""The trained policies and the stages that train them."""
 
 
 @dataclass(frozen=True)
@@ -25,8 +36,9 @@ class Finding:
 
 def examine() -> list[Finding]:
     """Run every check, in an order in which each one makes sense."""
-    checks: list[Callable[[], Finding]] = [_python, _packages, _robot, _compiler, _models, _dvc]
-    return [check() for check in checks]
+    checks: list[Callable[[], Finding]] = [_python, _packages, _robot, _compiler, _cache]
+    checks += [partial(_policy, name) for name in _POLICIES]
+    return [check() for check in [*checks, _pipeline]]
 
 
 def _python() -> Finding:
@@ -53,7 +65,7 @@ def _packages() -> Finding:
         if found != wanted.partition("+")[0]:
             wrong.append(f"{name} {found} instead of {wanted}")
     if wrong:
-        return Finding("Packages", False, "; ".join(wrong), f"pip install -r {lock}")
+        return Finding("Packages", False, "; ".join(wrong), _INSTALL)
     return Finding("Packages", True, "as in requirements.lock")
 
 
@@ -77,17 +89,37 @@ def _compiler() -> Finding:
     return Finding("C compiler", True, "none: the solver is slower, with the same results", hint)
 
 
-def _models() -> Finding:
-    networks = ("instruction", "grasp", "place")
-    files = [f"{network}.{kind}" for network in networks for kind in ("safetensors", "json")]
-    missing = [name for name in files if not (MODELS / name).is_file()]
-    if missing:
-        detail = f"{', '.join(missing)} missing in {MODELS}"
-        return Finding("Models", False, detail, "git checkout models, or: dvc repro train_policy")
-    return Finding("Models", True, str(MODELS))
+def _cache() -> Finding:
+    try:
+        from guided_lgp.nlp.coarse.compiler import cache_folder
+
+        folder = cache_folder()
+        folder.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=folder):
+            return Finding("Cache", True, f"{folder} for compiled solvers")
+    except ImportError as error:
+        return Finding("Cache", False, str(error), _INSTALL)
+    except OSError as error:
+        fault = f"{folder} for compiled solvers: {error.strerror}"
+        return Finding("Cache", False, fault, "set XDG_CACHE_HOME to a folder that can be written")
 
 
-def _dvc() -> Finding:
+def _policy(name: str) -> Finding:
+    title = f"Policy {name}"
+    try:
+        from guided_lgp.policy.inference import load_policy
+
+        load_policy(MODELS, name)
+    except ImportError as error:
+        return Finding(title, False, str(error), _INSTALL)
+    except InputError as error:
+        return Finding(
+            title, False, str(error), f"git checkout models, or: dvc repro {_POLICIES[name]}"
+        )
+    return Finding(title, True, f"trained, in {MODELS}")
+
+
+def _pipeline() -> Finding:
     if (Path.cwd() / "dvc.yaml").is_file():
         return Finding("Pipeline", True, "dvc.yaml found")
     hint = "change to the folder of the clone to run the pipeline; plan works anywhere"
