@@ -2,7 +2,7 @@
 
 import ctypes
 import logging
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass, fields
 from functools import cache
 from typing import Any, Protocol
 
@@ -26,7 +26,7 @@ class Program:
     below the number of variables are variables, the others constants) with the parameters that
     start at ``parameters[parameter_start[i]]``; its rows start at ``row_start[i]``, and
     ``row_start`` has one entry more, the number of rows. ``order[v]`` is the place of a variable
-    in the factorisation.
+    in the factorisation. The fields are those of the structure in C, in its order.
     """
 
     kernel: Integers
@@ -59,7 +59,7 @@ class Program:
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of the augmented Lagrangian."""
+    """Settings of the augmented Lagrangian; the fields of the structure in C, in its order."""
 
     penalty: float = 30.0
     growth: float = 2.0
@@ -104,44 +104,20 @@ class Solver(Protocol):
         ...
 
 
+_COUNTS, _ARRAYS = ("variables", "instances", "rows"), tuple(f.name for f in fields(Program))
+
+
 class _CProgram(ctypes.Structure):
     _fields_ = (
-        *((name, ctypes.c_int) for name in ("variables", "instances", "rows")),
-        *(
-            (name, ctypes.c_void_p)
-            for name in (
-                "kernel",
-                "input_start",
-                "inputs",
-                "parameter_start",
-                "row_start",
-                "parameters",
-                "weight",
-                "target",
-                "lower",
-                "upper",
-                "order",
-            )
-        ),
+        *((name, ctypes.c_int) for name in _COUNTS),
+        *((name, ctypes.c_void_p) for name in _ARRAYS),
     )
 
 
 class _CSettings(ctypes.Structure):
-    _fields_ = (
-        *(
-            (name, ctypes.c_double)
-            for name in (
-                "penalty",
-                "growth",
-                "largest_penalty",
-                "damping",
-                "tolerance",
-                "slack",
-            )
-        ),
-        ("steps", ctypes.c_int),
-        ("inner", ctypes.c_int),
-        ("patience", ctypes.c_int),
+    _fields_ = tuple(
+        (f.name, ctypes.c_int if isinstance(f.default, int) else ctypes.c_double)
+        for f in fields(Settings)
     )
 
 
@@ -161,36 +137,11 @@ class Compiled:
         values = np.array(values, dtype=np.float64)
         residuals = np.empty(program.rows)
         worst = ctypes.c_double()
-        arrays = (
-            program.kernel,
-            program.input_start,
-            program.inputs,
-            program.parameter_start,
-            program.row_start,
-            program.parameters,
-            program.weight,
-            program.target,
-            program.lower,
-            program.upper,
-            program.order,
-        )
         header = _CProgram(
-            program.variables,
-            program.instances,
-            program.rows,
-            *(array.ctypes.data for array in arrays),
+            *(getattr(program, name) for name in _COUNTS),
+            *(getattr(program, name).ctypes.data for name in _ARRAYS),
         )
-        options = _CSettings(
-            settings.penalty,
-            settings.growth,
-            settings.largest_penalty,
-            settings.damping,
-            settings.tolerance,
-            settings.slack,
-            settings.steps,
-            settings.inner,
-            settings.patience,
-        )
+        options = _CSettings(*astuple(settings))
         steps = self._solve(
             ctypes.addressof(header),
             ctypes.addressof(options),
