@@ -113,3 +113,17 @@ def test_bad_objectives_are_answered_at_once(scene: Scene, limits: SearchLimits)
             scene, parse_objective(["(on red tab1)"]), scene.symbols, bounds, UNIFORM, limits
         )
     assert not bounds.coarse_asked
+
+
+def test_a_reattempt_leaves_the_circle(scene: Scene) -> None:
+    """The policy loves to move green to and fro, and then to move red."""
+    circles = Scorer(
+        lambda objective, state, action: (
+            {"green": 6.0, "red": 3.0}.get(action.box, 0.0) + 2.0 * (action.table == "tab2")
+        )
+    )
+    limits = SearchLimits(max_depth=8, reattempts=1, max_tree_size=20_000, max_paths=1000)
+    objective = parse_objective(["(on red tab2)"])
+    result = guided.plan(scene, objective, scene.symbols, ScriptedBounds(scene), circles, limits)
+    assert result.causes == ("max_depth",)
+    assert result.solved

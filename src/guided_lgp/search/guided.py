@@ -1,7 +1,6 @@
 """Guided LGP: a policy chooses the next action (paper, Sec. II-C and Appendix)."""
 
 from dataclasses import dataclass
-from heapq import heappop, heappush
 
 from guided_lgp.logic import (
     Objective,
@@ -75,7 +74,7 @@ class GuidedTree:
         return coarse.retreated[-1] if coarse.feasible else None
 
     def expand(self, node: Node, configuration: Keyframe) -> list[Node]:
-        """Generate the children of a node, most probable first.
+        """Generate the children of a node, in the fixed order of the logic.
 
         Args:
             node: a node whose sequence is feasible.
@@ -98,7 +97,7 @@ class GuidedTree:
         ]
         self.run.expansions += 1
         self.size += len(children)
-        return sorted(children, key=lambda child: -child.log_p)
+        return children
 
 
 def plan(
@@ -113,7 +112,10 @@ def plan(
     """Follow the most probable action; reattempt from the most probable unexplored node.
 
     An attempt ends when the NLP of its sequence is infeasible (coarse bound at every step, path
-    bound when the goals hold) or at ``limits.max_depth``; ``limits.reattempts`` more follow.
+    bound when the goals hold) or at ``limits.max_depth``; ``limits.reattempts`` more follow. What
+    failed is excluded: sequences that are infeasible, and the symbolic states of an attempt that
+    ran to the maximum depth, where the policy would go in the same circles again. From then on
+    neither they nor states passed in the attempt itself are entered, unless nothing else is left.
 
     Args:
         adapt: objective adaptation: encode only the goals that do not hold yet (Sec. III-A).
@@ -123,33 +125,43 @@ def plan(
     """
     tree = GuidedTree(scene, objective, symbols, bounds, policy, adapt)
     run = tree.run
-    unexplored: list[tuple[float, int, Node]] = []
-    node = tree.root
+    unexplored = [tree.root]
+    excluded: set[State] = set()
     for _ in range(1 + limits.reattempts):
-        cause = _attempt(node, tree, unexplored, limits.max_depth)
-        if cause is None:
-            return run.result(tree.size)
-        run.attempt_failed(cause)
         if not unexplored:
             return run.result(tree.size, "exhausted")
         if limit := run.limit_reached(tree.size, limits):
             return run.result(tree.size, limit)
-        node = heappop(unexplored)[-1]
-    return run.result(tree.size, "attempts")
+        node = _take_most_probable(unexplored, excluded)
+        cause = _attempt(node, tree, unexplored, excluded, limits.max_depth)
+        if cause is None:
+            return run.result(tree.size)
+        run.attempt_failed(cause)
+    return run.result(tree.size, "attempts" if unexplored else "exhausted")
 
 
 def _attempt(
-    node: Node, tree: GuidedTree, unexplored: list[tuple[float, int, Node]], max_depth: int
+    node: Node, tree: GuidedTree, unexplored: list[Node], excluded: set[State], max_depth: int
 ) -> Cause | None:
     """Extend a node greedily; None if a verified path satisfies the objective."""
+    passed: set[State] = set()
     while True:
         configuration = tree.configuration(node)
         if configuration is None:
             return "infeasible"
         if tree.satisfied(node):
             return None if tree.run.solve(node.skeleton) else "infeasible"
+        passed.add(node.state)
         if len(node.skeleton) >= max_depth:
+            excluded |= passed
             return "max_depth"
-        node, *others = tree.expand(node, configuration)
-        for other in others:
-            heappush(unexplored, (-other.log_p, other.number, other))
+        children = tree.expand(node, configuration)
+        node = _take_most_probable(children, excluded | passed if excluded else excluded)
+        unexplored += children
+
+
+def _take_most_probable(nodes: list[Node], excluded: set[State]) -> Node:
+    """Remove the most probable node, of an excluded state only if all are; ties: the older."""
+    chosen = min(nodes, key=lambda node: (node.state in excluded, -node.log_p, node.number))
+    nodes.remove(chosen)
+    return chosen
