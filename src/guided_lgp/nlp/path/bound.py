@@ -8,8 +8,9 @@ from guided_lgp.nlp.path.assembly import assemble
 from guided_lgp.nlp.path.grips import grips_of
 from guided_lgp.nlp.path.motions import Mover
 from guided_lgp.nlp.path.optimise import optimise
-from guided_lgp.nlp.path.options import Options, Outcome, Trouble
+from guided_lgp.nlp.path.options import Options
 from guided_lgp.nlp.path.situation import Situation
+from guided_lgp.nlp.path.task import Outcome, Task, Trouble
 from guided_lgp.nlp.results import CoarseResult, Failure, PathResult
 from guided_lgp.nlp.verify import verify_path
 from guided_lgp.scene import Scene
@@ -62,7 +63,7 @@ class PathBound:
         tried = 0
         for number, solution in enumerate(islice(chain([coarse_result], others), self._solutions)):
             tried = number + 1
-            options = Options(
+            task = Task(
                 self._scene,
                 self._mover,
                 self._grips,
@@ -72,12 +73,12 @@ class PathBound:
                 number,
             )
             limit = self._mover.queries + _QUERIES * (len(skeleton) + 4)
-            outcomes = self._search(options, limit, 0, options.start)
+            outcomes = self._search(Options(task), limit, 0, task.start)
             if not isinstance(outcomes, list):
                 continue
             steps = [step for outcome in outcomes for step in outcome.steps]
             for chosen in (optimise(self._mover, steps), steps):
-                trajectory = assemble(options.start, chosen)
+                trajectory = assemble(task.start, chosen)
                 report = verify_path(self._world, skeleton, trajectory)
                 if report.violation is None:
                     break
@@ -103,7 +104,10 @@ class PathBound:
             f"{tried} coarse solutions with grips, elbows and placements chosen anew",
         )
         return PathResult(
-            skeleton, feasible=False, failure=failure, time_s=time.perf_counter() - began
+            skeleton,
+            feasible=False,
+            failure=failure,
+            time_s=time.perf_counter() - began,
         )
 
     def _search(

@@ -65,7 +65,11 @@ class CollisionChecker:
         for table in scene.tables:
             x, y, top = table.position
             centre = pose((x, y, top - TABLE_THICKNESS / 2), table.yaw)
-            sides = (2 * table.half_extents[0], 2 * table.half_extents[1], TABLE_THICKNESS)
+            sides = (
+                2 * table.half_extents[0],
+                2 * table.half_extents[1],
+                TABLE_THICKNESS,
+            )
             self._add(table.name, 0, pin.XYZQUATToSE3(centre), coal.Box(*sides))
         for box in scene.boxes:
             self._add(box.name, 0, pin.XYZQUATToSE3(IDENTITY), coal.Box(*box.size))
@@ -171,7 +175,11 @@ class CollisionChecker:
         for row, coordinates in enumerate(self.coordinates(q, fingers)):
             pin.computeJointJacobians(self._model, self._data, coordinates)
             pin.computeDistances(
-                self._model, self._data, self._geometry, self._geometry_data, coordinates
+                self._model,
+                self._data,
+                self._geometry,
+                self._geometry_data,
+                coordinates,
             )
             results = self._geometry_data.distanceResults
             found = np.array([results[pair].min_distance for pair in self._active])

@@ -10,7 +10,13 @@ import numpy as np
 from guided_lgp.nlp.path.collision import CollisionChecker, Mode
 from guided_lgp.nlp.path.connect import connect, shortcut
 from guided_lgp.nlp.path.ik import Arm
-from guided_lgp.nlp.path.spaces import JointSpace, LevelSpace, continuous_path, turned, wound
+from guided_lgp.nlp.path.spaces import (
+    JointSpace,
+    LevelSpace,
+    continuous_path,
+    turned,
+    wound,
+)
 from guided_lgp.nlp.path.timing import time_path
 from guided_lgp.nlp.results import Array
 from guided_lgp.scene import GRIPPERS, Scene
@@ -185,7 +191,10 @@ def _rounded(space: JointSpace, points: list[Array]) -> list[Array]:
     path = [points[0]]
     for before, corner, after in zip(points, points[1:], points[2:], strict=False):
         for share in _ROUNDINGS:
-            begin, end = corner + share * (before - corner), corner + share * (after - corner)
+            begin, end = (
+                corner + share * (before - corner),
+                corner + share * (after - corner),
+            )
             t = np.linspace(0.0, 1.0, 9)[:, None]
             curve = (1 - t) ** 2 * begin + 2 * t * (1 - t) * corner + t**2 * end
             if space.collision(curve) is None:

@@ -66,7 +66,8 @@ def alternatives(
     x = drawn[:, :1] + c[:, None] * masses[:, 0] - s[:, None] * masses[:, 1]
     y = drawn[:, 1:2] + s[:, None] * masses[:, 0] + c[:, None] * masses[:, 1]
     inside = np.all(
-        (np.abs(x) <= support_half[0] - MARGIN) & (np.abs(y) <= support_half[1] - MARGIN), axis=1
+        (np.abs(x) <= support_half[0] - MARGIN) & (np.abs(y) <= support_half[1] - MARGIN),
+        axis=1,
     )
     drawn = drawn[inside]
     distance = np.hypot(drawn[:, 0] - reference[0], drawn[:, 1] - reference[1])

@@ -24,7 +24,11 @@ class JointSpace:
     scale = REACH
 
     def __init__(
-        self, checker: CollisionChecker, arm: Arm, q: Array, fingers: Mapping[str, float]
+        self,
+        checker: CollisionChecker,
+        arm: Arm,
+        q: Array,
+        fingers: Mapping[str, float],
     ) -> None:
         """The checker's mode must be the one of the motion; ``q`` (14,) holds the other arm."""
         self._checker = checker

@@ -67,5 +67,8 @@ def _stretch(rows: Array, step: float, velocity: Array, acceleration: Array) -> 
     rates = np.diff(rows, axis=0) / step
     changes = np.diff(np.vstack([np.zeros(7), rates, np.zeros(7)]), axis=0) / step
     changes[[0, -1]] *= 2.0  # from rest to the middle of the first interval: half a step
-    excess = max(np.max(np.abs(rates) / velocity), np.sqrt(np.max(np.abs(changes) / acceleration)))
+    excess = max(
+        np.max(np.abs(rates) / velocity),
+        np.sqrt(np.max(np.abs(changes) / acceleration)),
+    )
     return max(1.0, float(excess))
