@@ -8,7 +8,7 @@ INSTALLED := $(VENV)/.installed
 export PATH := $(BIN):$(PATH)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: setup repro test lint bench mlflow verify-determinism verify-interruption
+.PHONY: setup repro study test lint bench mlflow verify-determinism verify-interruption
 
 setup: $(INSTALLED)
 
@@ -27,6 +27,10 @@ repro: setup
 	dvc repro
 	-guided-lgp mlflow sync
 	python -m guided_lgp.report.readme
+
+# Spread over draws, ablations, data efficiency: policies of their own, on the data of `repro`.
+study: setup
+	dvc repro studies/dvc.yaml
 
 test: lint
 	pytest -n auto --dist loadfile

@@ -1,0 +1,313 @@
+"""The studies beside the pipeline: spread over draws, ablations, data efficiency, shuffled labels.
+
+A case is a policy that differs in something from the paper's or from the improved one; it is
+trained once per seed, which draws the training objectives and seeds the training. Every policy then
+solves all problems of the generalization test, up to the coarse bound: a sequence that has one
+counts as a plan, the path bound is not asked. A verdict is computed once per configuration and
+shared by all policies.
+"""
+
+import logging
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from guided_lgp import parallel
+from guided_lgp.documents import write_json
+from guided_lgp.errors import InputError
+from guided_lgp.experiments.files import read_table
+from guided_lgp.logic import (
+    Skeleton,
+    format_objective,
+    one_goal_objectives,
+    satisfied,
+    two_goal_objectives,
+)
+from guided_lgp.nlp.bounds import SceneBounds
+from guided_lgp.nlp.results import CoarseResult, PathResult
+from guided_lgp.params import (
+    BoundsParams,
+    Params,
+    SearchLimits,
+    Section,
+    Seed,
+    TrainPolicy,
+    TrainRelational,
+    Variant,
+    load_params,
+    read_params,
+)
+from guided_lgp.paths import PARAMS, REPORTS, SCENES, SEQUENCES
+from guided_lgp.policy.dataset import Dataset
+from guided_lgp.policy.inference import load_policy
+from guided_lgp.policy.relational.train import train_split
+from guided_lgp.policy.samples import build_dataset
+from guided_lgp.policy.split import training_objectives
+from guided_lgp.policy.train import train_models
+from guided_lgp.scene import Scene, load_scenes
+from guided_lgp.search import best_first, guided
+from guided_lgp.search.result import SearchResult
+
+OUTCOMES = ("shortest", "feasible", "no_solution")
+
+STUDIES = Path("studies")
+POLICIES = Path("data/studies")
+RESULTS = REPORTS / "studies"
+
+Row = dict[str, Any]
+Planner = Literal["default", "adaptation", "best_first"]
+
+PLANNERS: Mapping[Planner, Callable[..., SearchResult]] = {
+    "default": partial(guided.plan, adapt=False),
+    "adaptation": guided.plan,
+    "best_first": best_first.plan,
+}
+
+logger = logging.getLogger(__name__)
+
+
+class Case(Section):
+    """A policy, by what differs from the paper's."""
+
+    title: str
+    policy: Literal["paper", "improved", "relational"]
+    """Whose training: the paper's networks (Table IV), the improved variant or the relational."""
+    variant: Variant = Variant()
+    """How samples are made and encoded."""
+    seeds: Annotated[int, Field(strict=True, ge=1)]
+    """How many of the seeds it is trained with."""
+    configurations: Annotated[int, Field(strict=True, ge=1)]
+    """How many training configurations, the first ones."""
+    objectives: Annotated[int, Field(strict=True, ge=1, le=72)]
+    """How many training objectives."""
+    split: Literal["random", "configuration"] = "random"
+    """How samples for early stopping are chosen."""
+    shuffled: Annotated[bool, Field(strict=True)] = False
+    """Whether the actions of all samples are exchanged at random."""
+    planners: tuple[Planner, ...] = ("default", "adaptation", "best_first")
+
+
+class Training(Section):
+    """Training of the policies; cheaper than the pipeline's where that costs nothing."""
+
+    paper: TrainPolicy
+    improved: TrainPolicy
+    relational: TrainRelational
+
+
+class StudyTable(Section):
+    """One study: its cases, in order."""
+
+    title: str
+    cases: tuple[str, ...]
+
+
+class StudyParams(Section):
+    """The content of ``studies/params.yaml``."""
+
+    seeds: Annotated[tuple[Seed, ...], Field(min_length=1)]
+    limits: SearchLimits
+    training: Training
+    cases: dict[str, Case]
+    tables: dict[str, StudyTable]
+
+
+def load_study(root: Path) -> tuple[StudyParams, Params]:
+    """The parameters of the studies and those of the pipeline.
+
+    Raises:
+        InputError: a file is missing or damaged; a table names a case that does not exist, or a
+            case wants more seeds than there are.
+    """
+    path = root / STUDIES / "params.yaml"
+    study = read_params(path, StudyParams)
+    for table, content in study.tables.items():
+        for name in content.cases:
+            if name not in study.cases:
+                where = f"{path}: tables.{table}.cases"
+                raise InputError(where, f"unknown case {name!r}", ", ".join(study.cases))
+    for name, case in study.cases.items():
+        if case.seeds > len(study.seeds):
+            raise InputError(
+                f"{path}: cases.{name}.seeds", f"is {case.seeds}", f"up to {len(study.seeds)}"
+            )
+    return study, load_params(root / PARAMS)
+
+
+@dataclass(frozen=True)
+class _Training:
+    """One policy to train."""
+
+    case: Case
+    seed: int
+    settings: TrainPolicy | TrainRelational
+    slack: int
+    root: Path
+    directory: Path
+
+
+def train(root: Path, name: str) -> None:
+    """Train the policies of a case: ``data/studies/<case>/<seed>``.
+
+    Raises:
+        InputError: bad parameters, an unknown case, or an output of the pipeline is missing.
+    """
+    study, params = load_study(root)
+    if name not in study.cases:
+        raise InputError(f"case {name!r}", "is unknown", ", ".join(study.cases))
+    case = study.cases[name]
+    settings: TrainPolicy | TrainRelational = getattr(study.training, case.policy)
+    tasks = [
+        _Training(
+            case=case,
+            seed=seed,
+            settings=settings.model_copy(update={"seed": seed}),
+            slack=params.enumerate_sequences.slack,
+            root=root,
+            directory=root / POLICIES / name / str(seed),
+        )
+        for seed in study.seeds[: case.seeds]
+    ]
+    parallel.run(_train, tasks, params.parallel, f"training {name}")
+
+
+def _train(task: _Training) -> None:
+    dataset = _dataset(task)
+    if isinstance(task.settings, TrainRelational):
+        train_split(dataset, task.settings, task.case.split).save(task.directory)
+    else:
+        for model in train_models(dataset, task.settings, task.case.split).values():
+            model.save(task.directory)
+
+
+def _dataset(task: _Training) -> Dataset:
+    scenes = load_scenes(task.root / SCENES / "training.json").scenes
+    dataset = build_dataset(
+        scenes[: task.case.configurations],
+        task.root / SEQUENCES / "training.parquet",
+        task.root / SEQUENCES / "training_shortest.parquet",
+        training_objectives(scenes[0].symbols, task.case.objectives, task.seed),
+        task.slack,
+        task.case.variant,
+        task.seed,
+    )
+    if not task.case.shuffled:
+        return dataset
+    rng = np.random.default_rng(np.random.SeedSequence(task.seed))
+    return replace(dataset, actions=rng.permutation(dataset.actions))
+
+
+class CoarseBounds:
+    """The bounds of the NLP without the path: a sequence with a coarse bound counts as feasible."""
+
+    def __init__(self, scene: Scene, params: BoundsParams) -> None:
+        self._bounds = SceneBounds(scene, params)
+
+    def coarse(self, skeleton: Skeleton) -> CoarseResult:
+        """P_coarse(a_1:K)."""
+        return self._bounds.coarse(skeleton)
+
+    def path(self, skeleton: Skeleton) -> PathResult:
+        """The verdict of the coarse bound."""
+        return PathResult(skeleton, self.coarse(skeleton).feasible)
+
+
+@dataclass(frozen=True)
+class _Evaluation:
+    """All problems of one test configuration, for every policy."""
+
+    scene: Scene
+    shortest: Mapping[str, int | None]
+    """Shortest feasible length by objective."""
+    study: StudyParams
+    bounds: BoundsParams
+    root: Path
+
+
+def evaluate(root: Path) -> None:
+    """Write ``reports/studies/<study>.json``: figures of each case, planner, seed and subset.
+
+    Raises:
+        InputError: bad parameters, or an output of the pipeline or of the training is missing.
+    """
+    study, params = load_study(root)
+    scenes = load_scenes(root / SCENES / "test.json").scenes
+    lengths: dict[str, dict[str, int | None]] = {scene.name: {} for scene in scenes}
+    path = root / SEQUENCES / "test_shortest.parquet"
+    for row in read_table(path, "enumerate_sequences", ["configuration", "objective", "length"]):
+        lengths[row["configuration"]][row["objective"]] = row["length"]
+    tasks = [
+        _Evaluation(scene, lengths[scene.name], study, params.bounds, root) for scene in scenes
+    ]
+    parts = parallel.run(_evaluate, tasks, params.parallel, "studies")
+    rows: dict[tuple[str, int, str], list[Row]] = {run: [] for run in _runs(study)}
+    for row in (row for part in parts for row in part):
+        rows[row["run"]].append(row)
+    for table, content in study.tables.items():
+        figures = {
+            name: {
+                planner: _by_subset([rows[run] for run in rows if run[::2] == (name, planner)])
+                for planner in study.cases[name].planners
+            }
+            for name in content.cases
+        }
+        write_json(root / RESULTS / f"{table}.json", figures)
+
+
+def _by_subset(runs: Sequence[Sequence[Row]]) -> dict[str, dict[str, list[float | int]]]:
+    """All or unseen objectives, then figures as in Table I, each with one value per run."""
+    subsets: dict[str, dict[str, list[float | int]]] = {}
+    for subset, only in (("all", False), ("unseen", True)):
+        counted = [[row for row in run if row["unseen"] or not only] for run in runs]
+        subsets[subset] = {"n": [len(run) for run in counted]}
+        for outcome in OUTCOMES:
+            subsets[subset][outcome] = [
+                sum(row["outcome"] == outcome for row in run) / max(len(run), 1) for run in counted
+            ]
+    return subsets
+
+
+def _evaluate(task: _Evaluation) -> list[Row]:
+    symbols = task.scene.symbols
+    bounds = CoarseBounds(task.scene, task.bounds)
+    problems = [
+        objective
+        for objective in one_goal_objectives(symbols) + two_goal_objectives(symbols)
+        if not satisfied(task.scene.state, objective)
+    ]
+    rows = []
+    for name, seed, planner in _runs(task.study):
+        case = task.study.cases[name]
+        kind = "relational" if case.policy == "relational" else "paper"  # the kind of files
+        policy = load_policy(task.root / POLICIES / name / str(seed), kind)
+        seen = set(training_objectives(symbols, case.objectives, seed))
+        for objective in problems:
+            result = PLANNERS[planner](
+                task.scene, objective, symbols, bounds, policy, task.study.limits
+            )
+            rows.append(
+                {
+                    "run": (name, seed, planner),
+                    "unseen": objective not in seen,
+                    "outcome": _outcome(result, task.shortest[format_objective(objective)]),
+                }
+            )
+    return rows
+
+
+def _runs(study: StudyParams) -> Iterator[tuple[str, int, Planner]]:
+    for name, case in study.cases.items():
+        for seed in study.seeds[: case.seeds]:
+            for planner in case.planners:
+                yield name, seed, planner
+
+
+def _outcome(result: SearchResult, shortest: int | None) -> str:
+    if result.skeleton is None:
+        return "no_solution"
+    return "shortest" if len(result.skeleton) == shortest else "feasible"

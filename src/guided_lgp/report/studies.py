@@ -1,0 +1,101 @@
+"""The tables of the studies: ``reports/studies/studies.md``, and each as CSV and LaTeX."""
+
+import logging
+import shutil
+import statistics
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from guided_lgp.documents import read_json, written_whole
+from guided_lgp.experiments.studies import OUTCOMES, RESULTS, StudyParams, StudyTable, load_study
+from guided_lgp.report.table import Record, Table
+
+PLANNERS = {"default": "default", "adaptation": "adaptation", "best_first": "best-first"}
+SHOWN = (("shortest", "all"), ("shortest", "unseen"), ("no_solution", "all"))
+"""The figures in the formatted table, by outcome and subset; the CSV file has all."""
+
+Figures = Mapping[str, Mapping[str, Mapping[str, Mapping[str, Sequence[float]]]]]
+"""Case, planner, subset, figure: one value per run."""
+
+logger = logging.getLogger(__name__)
+
+
+def render(root: Path) -> None:
+    """Write the tables.
+
+    Raises:
+        InputError: bad parameters, or an output of the stage evaluate is missing.
+    """
+    study, _ = load_study(root)
+    folder = root / RESULTS / "tables"
+    shutil.rmtree(folder, ignore_errors=True)
+    sections = []
+    for name, content in study.tables.items():
+        figures = read_json(
+            root / RESULTS / f"{name}.json", "the output of studies/run.py evaluate"
+        )
+        table = _table(name, content, figures, study)
+        for suffix, text in (("tex", table.latex()), ("csv", table.csv())):
+            with written_whole(folder / f"{name}.{suffix}") as file:
+                file.write_text(text, encoding="utf-8")
+        sections.append(table.markdown())
+    with written_whole(root / RESULTS / "studies.md") as file:
+        file.write_text("\n".join(["# Studies", "", *sections]), encoding="utf-8")
+    logger.info("studies: %s", root / RESULTS / "studies.md")
+
+
+def _table(name: str, content: StudyTable, figures: Figures, study: StudyParams) -> Table:
+    rows, records = [], []
+    for case in content.cases:
+        title = study.cases[case].title
+        cells = [title, str(study.cases[case].seeds)]
+        for planner in PLANNERS:
+            subsets = figures[case].get(planner)
+            cells += [
+                "–" if subsets is None else _cell(subsets[subset][outcome])
+                for outcome, subset in SHOWN
+            ]
+        rows.append(tuple(cells))
+        records += _records(case, title, figures[case])
+    own = study.training.paper
+    return Table(
+        name=f"study_{name}",
+        title=content.title,
+        columns=("policy", "runs", *("shortest, all", "unseen", "no plan") * len(PLANNERS)),
+        groups=(("", 2), *((f"{label}, %", 3) for label in PLANNERS.values())),
+        rows=tuple(rows),
+        notes=(
+            "Shares of the problems that do not hold at the start, over the test configurations "
+            "and the 87 objectives; mean ± standard deviation over runs, each with its own draw of "
+            "the training objectives and its own seed. No plan: of all objectives.",
+            "A sequence with a coarse bound counts as a plan; the path bound is not asked.",
+            f"Training differs from Table IV in the batches ({own.place.batch}), the learning rate "
+            f"({own.place.lr:g}) and the epochs (at most {own.place.epochs}, patience "
+            f"{own.patience}).",
+        ),
+        records=records,
+    )
+
+
+def _records(case: str, title: str, figures: Mapping[str, Any]) -> list[Record]:
+    return [
+        {
+            "case": case,
+            "title": title,
+            "planner": planner,
+            "objectives": subset,
+            "figure": outcome,
+            "runs": len(values[outcome]),
+            "mean": statistics.fmean(values[outcome]),
+            "std": statistics.stdev(values[outcome]) if len(values[outcome]) > 1 else None,
+        }
+        for planner, subsets in figures.items()
+        for subset, values in subsets.items()
+        for outcome in OUTCOMES
+    ]
+
+
+def _cell(values: Sequence[float]) -> str:
+    mean = f"{100 * statistics.fmean(values):.1f}"
+    return f"{mean} ± {100 * statistics.stdev(values):.1f}" if len(values) > 1 else mean

@@ -1,0 +1,191 @@
+"""The studies at a tiny scale, and their declaration."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pyarrow as pa
+import pytest
+import yaml
+from test_protocols import NothingOnBlue
+
+from guided_lgp.errors import InputError
+from guided_lgp.experiments import studies
+from guided_lgp.experiments.enumerate_sequences import shortest_table, verdict_table
+from guided_lgp.experiments.files import write_table
+from guided_lgp.logic import one_goal_objectives, satisfied, two_goal_objectives
+from guided_lgp.params import load_params
+from guided_lgp.report.studies import render
+from guided_lgp.scene import generate
+from guided_lgp.search.enumerate import enumerate_sequences
+
+ROOT = Path(__file__).parents[2]
+NETWORK = {
+    "layers": 1,
+    "nodes": 16,
+    "dropout": 0.1,
+    "l2": 1e-4,
+    "epochs": 2,
+    "batch": 512,
+    "lr": 1e-2,
+}
+NETWORKS = {
+    "seed": 0,
+    "validation_share": 0.5,
+    "patience": 5,
+    **dict.fromkeys(("instruction", "grasp", "place"), NETWORK),
+}
+RELATIONAL = {
+    "seed": 0,
+    "validation_share": 0.5,
+    "patience": 5,
+    "width": 4,
+    "rounds": 1,
+    "l2": 0.0,
+    "epochs": 1,
+    "batch": 512,
+    "lr": 1e-2,
+}
+SMALL = {"policy": "paper", "seeds": 1, "configurations": 2, "objectives": 40}
+STUDY: dict[str, Any] = {
+    "seeds": [4, 11],
+    "limits": {"max_depth": 3, "reattempts": 0, "max_tree_size": 40, "max_paths": 2},
+    "training": {"paper": NETWORKS, "improved": NETWORKS, "relational": RELATIONAL},
+    "cases": {
+        "paper": {**SMALL, "title": "paper", "seeds": 2},
+        "relational": {**SMALL, "title": "relational", "policy": "relational"},
+        "shuffled": {
+            **SMALL,
+            "title": "shuffled",
+            "shuffled": True,
+            "split": "configuration",
+            "planners": ["adaptation"],
+        },
+    },
+    "tables": {
+        "spread": {"title": "Spread", "cases": ["paper", "relational"]},
+        "floor": {"title": "Floor", "cases": ["paper", "shuffled"]},
+    },
+}
+
+
+def write(root: Path, study: dict[str, Any]) -> None:
+    (root / "studies").mkdir(exist_ok=True)
+    (root / "studies/params.yaml").write_text(yaml.safe_dump(study, sort_keys=False))
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    """A folder with parameters."""
+    pipeline = yaml.safe_load((ROOT / "params.yaml").read_text())
+    pipeline["parallel"]["workers"] = 1
+    (tmp_path / "params.yaml").write_text(yaml.safe_dump(pipeline))
+    write(tmp_path, STUDY)
+    return tmp_path
+
+
+def enumerate_all(root: Path, split: str, count: int) -> None:
+    """Scenes and sequences as the pipeline writes them, of up to two actions."""
+    generated = generate("a", count, 1, split)
+    generated.save(root / f"data/scenes/{split}.json")
+    tables: tuple[list[pa.Table], list[pa.Table]] = ([], [])
+    for scene in generated.scenes:
+        objectives = one_goal_objectives(scene.symbols) + two_goal_objectives(scene.symbols)
+        bounds = NothingOnBlue(scene, load_params(root / "params.yaml").bounds)
+        found = enumerate_sequences(scene.state, scene.symbols, objectives, bounds, 2, 0)
+        tables[0].append(verdict_table(scene, found))
+        tables[1].append(shortest_table(scene, found))
+    for suffix, parts in zip(("", "_shortest"), tables, strict=True):
+        write_table(root / f"data/sequences/{split}{suffix}.parquet", pa.concat_tables(parts))
+
+
+def test_train_evaluate_render(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(studies, "SceneBounds", NothingOnBlue)
+    enumerate_all(root, "training", 2)
+    enumerate_all(root, "test", 1)
+    for case in STUDY["cases"]:
+        studies.train(root, case)
+    studies.evaluate(root)
+    spread = json.loads((root / "reports/studies/spread.json").read_text())
+    assert list(spread) == ["paper", "relational"]
+    for case, planners in spread.items():
+        assert list(planners) == ["default", "adaptation", "best_first"]
+        for figures in planners.values():
+            for values in figures.values():
+                assert len(values["n"]) == STUDY["cases"][case]["seeds"]
+                outcomes = [values[name] for name in studies.OUTCOMES]
+                assert [sum(run) for run in zip(*outcomes, strict=True)] == pytest.approx(
+                    [1.0] * len(values["n"])
+                )
+    scene = generate("a", 1, 1, "test").scenes[0]
+    objectives = one_goal_objectives(scene.symbols) + two_goal_objectives(scene.symbols)
+    problems = sum(not satisfied(scene.state, goals) for goals in objectives)
+    assert spread["paper"]["default"]["all"]["n"] == [problems] * 2
+    assert spread["paper"]["default"]["unseen"]["n"][0] < problems
+    floor = json.loads((root / "reports/studies/floor.json").read_text())
+    assert floor["paper"] == spread["paper"]
+    assert list(floor["shuffled"]) == ["adaptation"]
+
+    render(root)
+    page = (root / "reports/studies/studies.md").read_text()
+    assert "**Spread**" in page
+    assert "**Floor**" in page
+    table = pd.read_csv(root / "reports/studies/tables/spread.csv")
+    row = table.query(
+        "case == 'paper' and planner == 'adaptation' and objectives == 'all' "
+        "and figure == 'shortest'"
+    ).iloc[0]
+    values = spread["paper"]["adaptation"]["all"]["shortest"]
+    assert row["mean"] == pytest.approx(sum(values) / 2)
+    assert row["runs"] == 2
+    assert f"{100 * row['mean']:.1f} ± {100 * row['std']:.1f}" in page
+    assert (root / "reports/studies/tables/floor.tex").is_file()
+
+
+@pytest.mark.parametrize(
+    ("change", "fault"),
+    [
+        ({"tables": {"x": {"title": "x", "cases": ["none"]}}}, "tables.x.cases: unknown case"),
+        ({"seeds": [4]}, "cases.paper.seeds: is 2 .*up to 1"),
+        ({"cases": {"a": {**SMALL, "titel": "x"}}}, "cases.a.title: missing"),
+        ({"cases": {"a": {**SMALL, "title": "a", "of": 1}}}, "cases.a.of: unknown key .*policy"),
+        ({"other": 1}, "other: unknown key .*seeds, limits"),
+    ],
+)
+def test_bad_parameters(root: Path, change: dict[str, Any], fault: str) -> None:
+    write(root, STUDY | change)
+    with pytest.raises(InputError, match=fault):
+        studies.load_study(root)
+
+
+def test_unknown_cases_are_refused(root: Path) -> None:
+    with pytest.raises(InputError, match=r"case 'none': is unknown .*paper, relational"):
+        studies.train(root, "none")
+
+
+def test_the_declared_studies() -> None:
+    """The cases called paper and improved are the pipeline's; the outputs are those of dvc.yaml."""
+    study, params = studies.load_study(ROOT)
+    pipeline = load_params(ROOT / "params.yaml")
+    assert params == pipeline
+    for name in ("paper", "improved", "relational"):
+        case = study.cases[name]
+        assert case.seeds >= 3
+        assert case.configurations == pipeline.generate_scenes.training_configurations
+        assert case.objectives == pipeline.build_dataset.training_objectives
+    assert study.cases["improved"].variant == pipeline.build_dataset.improved
+    for network in ("instruction", "grasp", "place"):
+        for ours, theirs in (
+            (study.training.paper, pipeline.train_policy),
+            (study.training.improved, pipeline.train_improved),
+        ):
+            own, other = getattr(ours, network), getattr(theirs, network)
+            assert (own.layers, own.nodes, own.dropout) == (
+                other.layers,
+                other.nodes,
+                other.dropout,
+            )
+    stages = yaml.safe_load((ROOT / "studies/dvc.yaml").read_text())["stages"]
+    outs = {name for out in stages["evaluate"]["outs"] for name in out}
+    assert outs == {f"reports/studies/{table}.json" for table in study.tables}
