@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from math import ceil
 from pathlib import Path
 from statistics import fmean, median
 from typing import Any
@@ -35,8 +36,8 @@ SEED = 20_001
 """Of scenes and sequences; no stage of the pipeline uses it."""
 CONFIGURATIONS = 20
 MANY_TRIES = 40
-PROGRAMS_FOR_IPOPT = 30
-"""Programs per length that IPOPT gets: it takes seconds to build and to solve one."""
+PROGRAMS_FOR_IPOPT = {2: 30, 4: 30, 6: 20, 8: 15, 10: 12}
+"""Programs that IPOPT gets at most, by length: it takes seconds to build and to solve one."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,7 @@ def run_task(task: Task) -> dict[str, Any]:
         "coarse_first_try": fmean(sequence.result.tries == 1 for sequence in solved),
         "false_infeasible": 1 - len(solved) / possible,
         "infeasible_share": 1 - len(solved) / count,
-        "ipopt": _against_ipopt(solved[:: max(1, len(solved) // PROGRAMS_FOR_IPOPT)]),
+        "ipopt": _against_ipopt(solved[:: ceil(len(solved) / PROGRAMS_FOR_IPOPT[length])]),
     }
 
 
