@@ -8,7 +8,7 @@ INSTALLED := $(VENV)/.installed
 export PATH := $(BIN):$(PATH)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: setup repro study test lint bench mlflow verify-determinism verify-interruption
+.PHONY: setup repro study test lint bench mlflow verify-determinism verify-interruption verify-load
 
 setup: $(INSTALLED)
 
@@ -52,6 +52,10 @@ verify-determinism: setup
 # The small profile with every process killed at random moments, against an undisturbed run.
 verify-interruption: setup
 	python tests/interruption.py
+
+# 500 plans in one process, 200 experiments in one database.
+verify-load: setup
+	python tests/load.py
 
 mlflow: setup
 	guided-lgp mlflow ui

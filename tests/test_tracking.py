@@ -108,6 +108,25 @@ def test_the_database_is_the_clones_own(clone: Path, monkeypatch: pytest.MonkeyP
     assert tracking.tracking_uri() == "http://127.0.0.1:5000"
 
 
+def test_a_database_whose_making_is_interrupted_is_made_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from mlflow.store.db import utils
+
+    def migrate(engine: Any) -> None:
+        assert not (tmp_path / "mlflow.db").exists()
+        raise KeyboardInterrupt
+
+    monkeypatch.setenv("MLFLOW_TRACKING_URI", f"sqlite:///{tmp_path / 'mlflow.db'}")
+    with monkeypatch.context() as patch:
+        patch.setattr(utils, "_upgrade_db", migrate)
+        patch.setattr(utils, "_initialize_tables", migrate)
+        with pytest.raises(KeyboardInterrupt):
+            tracking.prepare()
+    assert tracking.prepare().get_experiment_by_name(tracking.EXPERIMENT) is not None
+    assert {file.name for file in tmp_path.iterdir()} == {"mlflow.db"}
+
+
 def test_temporary_experiments_record_in_their_origin(
     clone: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

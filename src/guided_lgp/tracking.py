@@ -31,6 +31,7 @@ from guided_lgp.paths import PARAMS
 Value = TypeVar("Value")
 
 EXPERIMENT = "guided-lgp"
+SQLITE = "sqlite:///"
 STAGE_TAG = "guided_lgp.stage"
 KEY_TAG = "guided_lgp.key"
 EXECUTION_TAG = "guided_lgp.execution"
@@ -82,7 +83,7 @@ def repository() -> Path:
 
 def tracking_uri() -> str:
     """Where runs are recorded: ``MLFLOW_TRACKING_URI``, or the database of the clone."""
-    return os.environ.get("MLFLOW_TRACKING_URI") or f"sqlite:///{repository() / 'mlflow.db'}"
+    return os.environ.get("MLFLOW_TRACKING_URI") or f"{SQLITE}{repository() / 'mlflow.db'}"
 
 
 def prepare() -> Any:
@@ -99,14 +100,28 @@ def prepare() -> Any:
     for noisy in ("alembic", "mlflow"):
         logging.getLogger(noisy).setLevel(logging.ERROR)
     uri = tracking_uri()
+    local = uri.startswith(SQLITE)
+    if local:
+        _make_database(Path(uri.removeprefix(SQLITE)))
     mlflow.set_tracking_uri(uri)
     client = mlflow.MlflowClient(uri)
     if client.get_experiment_by_name(EXPERIMENT) is None:
-        local = uri.startswith("sqlite:///")
-        folder = Path(uri.removeprefix("sqlite:///")).resolve().parent / "mlruns"
+        folder = Path(uri.removeprefix(SQLITE)).resolve().parent / "mlruns"
         client.create_experiment(EXPERIMENT, folder.as_uri() if local else None)
     _end_killed(client)
     return client
+
+
+def _make_database(file: Path) -> None:
+    """Make the tables elsewhere: MLflow cannot open a database whose making was interrupted."""
+    import mlflow
+
+    if file.exists():
+        return
+    with TemporaryDirectory(dir=file.parent, prefix=".unfinished-") as folder:
+        made = Path(folder) / file.name
+        mlflow.MlflowClient(f"{SQLITE}{made}").search_experiments(max_results=1)
+        made.replace(file)
 
 
 @contextmanager
