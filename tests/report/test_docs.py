@@ -41,12 +41,12 @@ def test_commands_and_options_exist(page: Path) -> None:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_links_and_named_sources_exist(page: Path) -> None:
+def test_links_and_named_sources_exist(page: Path, rendered: Path) -> None:
     text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.M)
     links = re.findall(r"\]\(([^)#]+)\)", text) + re.findall(r'src="([^"]+)"', text)
     for link in links:
         if "://" not in link:
-            assert (page.parent / link).exists(), link
+            assert (page.parent / link).exists() or (rendered / link).exists(), link
     for name in re.findall(r"`((?:src/|tests/|stages/|examples/|benchmarks/)[\w/.]+)`", text):
         assert (ROOT / name).exists(), name
     modules = r"`((?:logic|scene|nlp|search|policy|experiments|report)/[\w/]+(?:\.py)?)`"

@@ -76,7 +76,7 @@ def test_breadth_first_is_compared_or_said_to_have_met_the_limit() -> None:
         guided | {"breadth_first": cell(None, solved=3)},
         {"guided": times(0.5), "breadth_first": times(None)},
     )
-    assert "Breadth-first met the limit of the tree size on c.1 (3 of 12 solved)." in text
+    assert "Breadth-first was stopped at a limit on c.1 (3 of 12 solved)." in text
 
 
 def test_an_aim_missed_is_said() -> None:

@@ -28,7 +28,8 @@ def test_everything_is_written(rendered: Path) -> None:
     tables = {path.name for path in (reports / "tables").iterdir()}
     names = {"table_1", "unseen", "training", "enumeration", "table_3_details"}
     names |= {"table_3_tree_size", "table_3_time"}
-    assert tables == {f"{n}.{s}" for n in names for s in ("md", "tex", "csv")}
+    files = {f"{n}.{s}" for n in names for s in ("md", "tex", "csv")}
+    assert tables == files | {"findings.md"}
     assert {path.name for path in (reports / "replays").iterdir()} == {
         f"{setup}.html" for setup in REPLAYS
     }
@@ -120,6 +121,7 @@ def test_readme_block_holds_the_tables(rendered: Path, tmp_path: Path) -> None:
     block = readme_block(rendered)
     assert block.count("**Table I") == 3
     assert "K = 20: e.10" in block
+    assert block.startswith("- Paper's networks: shortest solutions")
     with pytest.raises(InputError, match="render_reports"):
         readme_block(tmp_path)
 

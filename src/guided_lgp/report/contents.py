@@ -15,7 +15,8 @@ from guided_lgp.report.document import (
     Section,
 )
 from guided_lgp.report.inputs import Inputs
-from guided_lgp.report.table import Table
+from guided_lgp.report.style import POLICIES
+from guided_lgp.report.table import Table, plain
 
 COMMAND = "dvc repro"
 
@@ -33,6 +34,13 @@ DIFFERENCES = (
     "The paper's times were measured on its own machine, so only their growth compares.",
 )
 """Where this work departs from the paper, or had to choose."""
+
+
+def sentences(inputs: Inputs, calls: Mapping[str, float]) -> str:
+    """What the tables say, as a list in Markdown; arguments as those of :func:`compose`."""
+    found = findings.generalization(inputs.generalization, calls)
+    found += findings.scalability(inputs.scalability, inputs.timing)
+    return "".join(f"- {plain(sentence)}\n" for sentence in found)
 
 
 def compose(
@@ -58,7 +66,7 @@ def compose(
     generalization: list[Block] = [
         Bullets(findings.generalization(inputs.generalization, calls)),
         tables["table_1"],
-        findings.unseen(novelty),
+        findings.unseen(novelty, _symmetric(params)),
         tables["unseen"],
         Picture(
             "success.svg",
@@ -76,7 +84,7 @@ def compose(
             "Tree size and time against the number of actions",
             "Means over all problems of the same K, slightly shifted sideways to keep planners "
             "apart. Dashed: greedy; solid: best-first and planners without a policy. Open markers: "
-            "the paper's means. Crosses: stopped at the limit of the tree size (dotted).",
+            "the paper's means. Crosses: stopped at a limit; dotted: that of the tree size.",
         ),
         Bullets(findings.scalability(inputs.scalability, inputs.timing)),
         tables["table_3_tree_size"],
@@ -139,6 +147,12 @@ def compose(
         "have; and the training and geometry behind them.",
         sections,
     )
+
+
+def _symmetric(params: Params) -> list[str]:
+    """The policies to which all boxes are alike."""
+    improved = params.build_dataset.improved.boxes != "declared"
+    return [POLICIES["improved"]] * improved + [POLICIES["relational"]]
 
 
 def _reproduction(params: Params) -> Sequence[Block]:

@@ -1,7 +1,7 @@
 """What the tables say, in words."""
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 from guided_lgp.report import paper
 from guided_lgp.report.analysis import NEW, RENAMED, SEEN
@@ -56,11 +56,12 @@ def _calls(calls: float | None) -> str:
     return "" if calls is None else f"; {number(calls, 2)} policy calls per action"
 
 
-def unseen(kinds: Mapping[str, str]) -> str:
+def unseen(kinds: Mapping[str, str], symmetric: Sequence[str]) -> str:
     """What "unseen" means for a policy to which all boxes are alike.
 
     Args:
         kinds: of every objective; see :func:`guided_lgp.report.analysis.novelty`.
+        symmetric: names of the policies to which they are.
     """
     counts = Counter(kinds.values())
     total = counts[RENAMED] + counts[NEW]
@@ -68,9 +69,10 @@ def unseen(kinds: Mapping[str, str]) -> str:
         f"Of the {total} unseen objectives, {counts[RENAMED]} "
         f"({percent(counts[RENAMED] / max(total, 1))}) are one of the {counts[SEEN]} training "
         "objectives with its boxes renamed. The paper's networks have an input for every box and "
-        "must generalize to them; the relational policy treats all boxes alike, so that to it they "
-        f"are not new. The other {counts[NEW]} are new to any policy: objectives of one goal, "
-        "which no training objective has, and pairs of goals of a kind that was not drawn."
+        "must generalize to these objectives. All boxes are alike to "
+        f"{_join([f'the {name.lower()}' for name in symmetric])}, so that to a policy of this kind "
+        f"they are not new. The other {counts[NEW]} are new under any names: objectives of one "
+        "goal, which no training objective has, and pairs of goals of a kind that was not drawn."
     )
 
 
@@ -123,7 +125,7 @@ def _against_breadth_first(metrics: Metrics, timing: Metrics) -> Iterator[str]:
                 f"breadth-first generates its {number(tree, 0)} nodes in {number(seconds, 2)} s."
             )
     if limited:
-        yield f"Breadth-first met the limit of the tree size on {_join(limited)}."
+        yield f"Breadth-first was stopped at a limit on {_join(limited)}."
 
 
 def _against_the_paper(metrics: Metrics) -> Iterator[str]:

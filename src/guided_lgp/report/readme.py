@@ -7,11 +7,14 @@ from guided_lgp.paths import REPORTS
 
 BEGIN = "<!-- results: written by make repro -->"
 END = "<!-- end of results -->"
-TABLES = ("table_1", "table_3_tree_size", "table_3_time")
+PARTS = ("findings", "table_1", "table_3_tree_size", "table_3_time")
+"""Files of ``reports/tables`` that the README quotes."""
+OPTIONAL = ("geometry",)
+"""Those that are there once ``make bench`` has run."""
 
 
 def readme_block(root: Path) -> str:
-    """Tables I and III in Markdown, as the README holds them.
+    """What the tables say, Tables I and III and the geometry in Markdown, as the README has them.
 
     Args:
         root: the folder of ``dvc.yaml``.
@@ -20,11 +23,12 @@ def readme_block(root: Path) -> str:
         InputError: a table is missing.
     """
     texts = []
-    for name in TABLES:
+    for name in (*PARTS, *OPTIONAL):
         path = root / REPORTS / "tables" / f"{name}.md"
-        if not path.is_file():
+        if path.is_file():
+            texts.append(path.read_text(encoding="utf-8"))
+        elif name not in OPTIONAL:
             raise InputError(str(path), "is missing", "the output of stage render_reports")
-        texts.append(path.read_text(encoding="utf-8"))
     return "\n".join(texts)
 
 

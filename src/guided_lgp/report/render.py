@@ -16,7 +16,7 @@ from guided_lgp.params import BoundsParams, Params
 from guided_lgp.paths import METRICS, REPORTS
 from guided_lgp.policy.split import training_objectives
 from guided_lgp.report import analysis, figures, tables
-from guided_lgp.report.contents import compose
+from guided_lgp.report.contents import compose, sentences
 from guided_lgp.report.inputs import Inputs, Metrics, compared, load_inputs
 from guided_lgp.report.pictures import draw_scene
 from guided_lgp.report.replay import replay_html
@@ -58,6 +58,8 @@ def run(params: Params, root: Path) -> None:
             ("csv", table.csv()),
         ):
             (reports / "tables" / f"{table.name}.{suffix}").write_text(text, encoding="utf-8")
+    found = sentences(inputs, calls)
+    (reports / "tables" / "findings.md").write_text(found, encoding="utf-8")
     for name, figure in _figures(inputs, params).items():
         figures.save(figure, reports / "figures", name)
     for setup in inputs.setups:
