@@ -11,7 +11,7 @@ from guided_lgp.policy.dataset import Dataset
 from guided_lgp.policy.encoding import CHAINS
 from guided_lgp.policy.samples import build_dataset
 from guided_lgp.policy.split import training_objectives
-from guided_lgp.policy.train import train_network, validation_samples
+from guided_lgp.policy.train import train_models, train_network, validation_samples
 
 NETWORK = Network(layers=2, nodes=16, dropout=0.1, l2=1e-4, epochs=3, batch=64, lr=1e-3)
 SETTINGS = TrainPolicy(
@@ -80,3 +80,16 @@ def test_a_share_that_leaves_nothing_is_refused(world: Enumeration, tmp_path: Pa
     single = build_dataset(world.scenes[:1], world.sequences, world.shortest, objectives, slack=0)
     with pytest.raises(InputError, match=r"validation_share: .*configuration"):
         train_network("grasp", single, SETTINGS, ALONE, tmp_path)
+
+
+def test_training_for_studies_gives_the_same_networks(dataset: Dataset, tmp_path: Path) -> None:
+    train_network("instruction", dataset, SETTINGS, ALONE, tmp_path / "pipeline")
+    for split in ("random", "configuration"):
+        models = train_models(dataset, SETTINGS, split)
+        assert list(models) == list(CHAINS)
+        models["instruction"].save(tmp_path / split)
+    pipeline, *studies = (
+        (tmp_path / folder / "instruction.safetensors").read_bytes()
+        for folder in ("pipeline", "random", "configuration")
+    )
+    assert [pipeline == weights for weights in studies] == [True, False]
