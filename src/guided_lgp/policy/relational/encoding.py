@@ -23,7 +23,8 @@ GOAL_HELD = -2
 SETTLED = "settled: stands where it may stay, and so does all below it"
 CARRIES = "carries a box"
 CARRIES_ABOVE = "carries, directly or through others"
-SHALL_STAND_ON = "shall stand on"
+ELSEWHERE = "goal: stand elsewhere"
+READY = "goal: stand elsewhere, on what is settled"
 
 NODE_FEATURES = (
     "x",
@@ -33,7 +34,8 @@ NODE_FEATURES = (
     "held by another gripper",
     "is a box",
     "goal: be held",
-    "goal: stand elsewhere",
+    ELSEWHERE,
+    READY,
     "goal: holds",
     SETTLED,
     CARRIES,
@@ -48,8 +50,7 @@ EDGE_FEATURES = (
     "carries",
     "stands on, directly or through others",
     CARRIES_ABOVE,
-    SHALL_STAND_ON,
-    "shall carry",
+    "shall stand on",
 )
 """Inputs of every ordered pair of nodes, from the first one's point of view."""
 
@@ -165,12 +166,14 @@ def graphs(situations: Situations, limits: Range) -> Graphs:
     in_hand = of_tables(supports < 0)
     unsettled = np.maximum(of_tables(goal_open), in_hand)
     carried = np.swapaxes(above, 1, 2)
+    settled = 1 - np.maximum(unsettled, _any(above, unsettled))
     symbolic = [
         of_tables(np.ones_like(holds)),
         of_tables(goal_open & (goals == GOAL_HELD)),
         of_tables(goal_open & (goals >= 0)),
+        _any(shall, settled),
         of_tables(holds),
-        1 - np.maximum(unsettled, _any(above, unsettled)),
+        settled,
         on.max(axis=1),
         _any(carried, of_tables(goal_open)),
     ]
@@ -185,9 +188,7 @@ def graphs(situations: Situations, limits: Range) -> Graphs:
         hands = [of_tables(holder[:, gripper]), of_tables(by_other)]
         flags = np.stack([*hands, *symbolic, *arms], axis=-1, dtype=np.float32)
         by_gripper.append(np.concatenate([position, flags], axis=-1))
-    relations = np.stack(
-        [on, np.swapaxes(on, 1, 2), above, carried, shall, np.swapaxes(shall, 1, 2)], axis=-1
-    )
+    relations = np.stack([on, np.swapaxes(on, 1, 2), above, carried, shall], axis=-1)
     return Graphs(
         nodes=np.stack(by_gripper, axis=1),
         edges=np.repeat(relations[:, None], len(SIDES), axis=1),

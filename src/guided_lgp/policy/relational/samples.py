@@ -10,12 +10,12 @@ from guided_lgp.policy.dataset import Dataset
 from guided_lgp.policy.encoding import GOAL_KINDS, Encoding
 from guided_lgp.policy.relational.encoding import (
     CARRIES,
-    EDGE_FEATURES,
+    ELSEWHERE,
     GOAL_HELD,
     NO_GOAL,
     NODE_FEATURES,
+    READY,
     SETTLED,
-    SHALL_STAND_ON,
     SIDES,
     BoolArray,
     IntArray,
@@ -95,11 +95,10 @@ def supports_first(situations: Situations) -> BoolArray:
     what is settled.
     """
     inputs = graphs(situations, Range.of(situations))  # only what does not depend on positions
-    nodes, edges = inputs.nodes[:, 0], inputs.edges[:, 0]
+    nodes = inputs.nodes[:, 0]
     settled = nodes[..., NODE_FEATURES.index(SETTLED)] > 0
     alone = nodes[..., NODE_FEATURES.index(CARRIES)] == 0
-    awaits = edges[..., EDGE_FEATURES.index(SHALL_STAND_ON)] > 0
-    ready = ~(awaits & ~settled[:, None]).any(axis=2)
+    ready = nodes[..., NODE_FEATURES.index(READY)] >= nodes[..., NODE_FEATURES.index(ELSEWHERE)]
     return np.where(inputs.held[..., None] < 0, (alone & ready)[:, None], settled[:, None])
 
 
