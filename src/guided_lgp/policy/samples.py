@@ -335,7 +335,9 @@ def _shortest_lengths(
 
 def _read(path: Path, columns: pa.Schema) -> pd.DataFrame:
     try:
-        table = pq.read_table(path, columns=columns.names).cast(columns)
+        table = pq.read_table(path, columns=columns.names, page_checksum_verification=True).cast(
+            columns
+        )
         table.validate(full=True)  # strings that are no UTF-8, for instance
         frame: pd.DataFrame = table.to_pandas()
     except (OSError, ValueError, KeyError, pa.ArrowException) as error:
