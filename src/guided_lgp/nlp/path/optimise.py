@@ -6,8 +6,9 @@ limit (so that lengths are times at full speed, in s), it minimises length and s
 
     sum_i |W (q_i+1 - q_i)|^2 / h + tau^2 sum_i |W (q_i+1 - 2 q_i + q_i-1)|^2 / h^3.
 
-Where a straight line follows, its direction gives one more point beyond the end, so that the spline
-leaves along the line. Constraints are the joint limits and, for every waypoint and the pairs of
+Where a straight line precedes or follows, its direction gives one more point beyond the end, so that
+the spline leaves along the line. Motions of two actions that follow each other without a step in
+between are one: the arm then need not go home on the way. Constraints are the joint limits and, for every waypoint and the pairs of
 bodies nearest to each other there, the distance d and the tilt z (the vertical in the tool frame,
 kept on level motions), both linearised about the last iterate p:
 
@@ -46,7 +47,7 @@ ROUNDS = 5
 LEVEL = 0.01
 """How far (in sines) the vertical may turn in the tool frame on a level motion."""
 _TAU = 0.4
-"""Weight of smoothness against length (s): half the time in which a joint reaches full speed."""
+"""Weight of smoothness against length (s): about the time in which a joint reaches full speed."""
 _TRUST = 0.3
 """Largest change (rad) of a joint in a round that linearises constraints."""
 _CONVERGED = 0.03
