@@ -6,11 +6,11 @@ limit (so that lengths are times at full speed, in s), it minimises length and s
 
     sum_i |W (q_i+1 - q_i)|^2 / h + tau^2 sum_i |W (q_i+1 - 2 q_i + q_i-1)|^2 / h^3.
 
-Where a straight line precedes or follows, its direction gives one more point beyond the end, so that
-the spline leaves along the line. Motions of two actions that follow each other without a step in
-between are one: the arm then need not go home on the way. Constraints are the joint limits and, for every waypoint and the pairs of
-bodies nearest to each other there, the distance d and the tilt z (the vertical in the tool frame,
-kept on level motions), both linearised about the last iterate p:
+Where a straight line precedes or follows, its direction gives one more point beyond the end, so
+that the spline goes on along the line. Motions of two actions that follow each other without a step
+in between are one: the arm need not go home on the way. Constraints are the joint limits and, for
+every waypoint and the pairs of bodies nearest to each other there, the distance d and the tilt z
+(the vertical in the tool frame, kept on level motions), both linearised about the last iterate p:
 
     d(p_i) + d'(p_i) (q_i - p_i) >= CLEARANCE - slack_i,    z(p_i) + z'(p_i) (q_i - p_i) = z_0.
 
