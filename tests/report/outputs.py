@@ -86,6 +86,14 @@ def geometry() -> dict[str, dict[str, float]]:
     }
 
 
+def spread() -> dict[str, Any]:
+    """Shares per draw as ``make study`` writes them."""
+    shares = {"shortest": [0.9, 0.92, 0.94], "feasible": [0.1, 0.08, 0.06]}
+    subsets = {"all": shares, "unseen": shares}
+    searches = {"default": subsets, "adaptation": subsets, "best_first": subsets}
+    return {"paper": searches, "improved": searches, "relational": {"adaptation": subsets}}
+
+
 def _verdicts(scene: Scene, rng: np.random.Generator) -> list[dict[str, Any]]:
     rows, open_ = [], [((), scene.state)]
     for _ in range(3):

@@ -15,6 +15,8 @@ def test_results_are_replaced_between_the_markers(tmp_path: Path) -> None:
     tables.mkdir(parents=True)
     for name in (*PARTS, *OPTIONAL):
         (tables / f"{name}.md").write_text(f"table {name}\n")
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "docs/benchmarks.md").touch()
     readme = tmp_path / "README.md"
     readme.write_text(f"# Title\n\n{BEGIN}\nold\n{END}\n\nThe rest.\n")
     for _ in range(2):
@@ -23,6 +25,7 @@ def test_results_are_replaced_between_the_markers(tmp_path: Path) -> None:
     assert text.startswith(f"# Title\n\n{BEGIN}\n\ntable {PARTS[0]}\n")
     assert text.endswith(f"\n{END}\n\nThe rest.\n")
     assert "old" not in text
+    assert "(docs/benchmarks.md)" in text
     assert f"table {PARTS[-1]}\n" in text
     assert text.count(OPTIONAL[-1]) == 1
     readme.write_text("# Title\n")

@@ -126,7 +126,7 @@ def test_readme_block_holds_the_tables(rendered: Path, tmp_path: Path) -> None:
         readme_block(tmp_path)
 
 
-def test_rendering_again_gives_the_same_bytes_and_geometry_is_optional(
+def test_rendering_again_gives_the_same_bytes_and_other_figures_are_optional(
     rendered: Path, tmp_path: Path, params: Params, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(render, "SceneBounds", outputs.Bounds)
@@ -134,6 +134,7 @@ def test_rendering_again_gives_the_same_bytes_and_geometry_is_optional(
     shutil.copytree(rendered, root)
     (root / "reports/figures/old.png").touch()
     write_json(root / METRICS / "geometry.json", outputs.geometry())
+    write_json(root / "reports/studies/spread.json", outputs.spread())
     render.run(params, root)
     before = {
         path.relative_to(rendered): path.read_bytes()
@@ -146,12 +147,18 @@ def test_rendering_again_gives_the_same_bytes_and_geometry_is_optional(
         if path.is_file() and path.parent.name != "reports"
     }
     new = {str(path) for path in after.keys() - before.keys()}
-    assert new == {"reports/metrics/geometry.json"} | {
-        f"reports/tables/geometry.{suffix}" for suffix in ("md", "tex", "csv")
+    assert new == {"reports/metrics/geometry.json", "reports/studies/spread.json"} | {
+        f"reports/tables/{name}.{suffix}"
+        for name in ("geometry", "draws")
+        for suffix in ("md", "tex", "csv")
     }
     assert all(after[path] == content for path, content in before.items())
     page = (root / "reports/report.html").read_text(encoding="utf-8")
     assert "The two bounds of the NLP on random sequences" in page
+    assert '<a href="studies/studies.md">' in page
+    rows = {row[0]: row[1:] for row in rows_of(root / "reports/tables/draws.md")}
+    assert rows["Paper's networks"] == ["92.0% ± 2.0%"] * 6 + ["3"]
+    assert rows["Relational policy"] == ["–"] * 2 + ["92.0% ± 2.0%"] * 2 + ["–"] * 2 + ["3"]
 
 
 @pytest.mark.parametrize(

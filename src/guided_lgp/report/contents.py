@@ -50,7 +50,6 @@ def compose(
     calls: Mapping[str, float],
     tables: Mapping[str, Table],
     replays: Sequence[tuple[str, str]],
-    studies: str | None,
 ) -> Document:
     """Arrange the report.
 
@@ -61,7 +60,6 @@ def compose(
         calls: by planner, mean number of policy calls per action of the plan.
         tables: by name.
         replays: (address, text) of every replay.
-        studies: address of the studies' page, if they were made.
     """
     generalization: list[Block] = [
         Bullets(findings.generalization(inputs.generalization, calls)),
@@ -74,10 +72,9 @@ def compose(
             "Test configurations; n: problems not satisfied at the start, per planner.",
         ),
     ]
-    if studies is not None:
-        generalization.append(
-            Links([(studies, "Spread over draws of the training objectives and seeds; ablations")])
-        )
+    if "draws" in tables:
+        more = "Ablations, data efficiency and the floor of shuffled labels"
+        generalization[2:2] = [tables["draws"], Links([("studies/studies.md", more)])]
     scalability: list[Block] = [
         Picture(
             "headline.svg",

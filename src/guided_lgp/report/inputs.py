@@ -11,7 +11,7 @@ from guided_lgp.documents import read_json
 from guided_lgp.errors import InputError
 from guided_lgp.experiments.files import read_table
 from guided_lgp.experiments.problems import PROBLEMS, Problem
-from guided_lgp.paths import EVALUATION, METRICS, SCENES, SEQUENCES, TRAINING
+from guided_lgp.paths import EVALUATION, METRICS, REPORTS, SCENES, SEQUENCES, TRAINING
 from guided_lgp.report.style import NETWORKS, POLICIES, VARIANTS
 from guided_lgp.scene import GeneratedScenes, load_scenes
 
@@ -70,6 +70,9 @@ class Inputs:
     """By policy and network, the report of its training."""
     geometry: Metrics | None
     """Written by ``make bench``, which is not part of the pipeline."""
+    spread: Metrics | None
+    """Written by ``make study``, which is not part of the pipeline either: by policy, search, set
+    of objectives and figure, one value per draw of the training objectives."""
     scenes: Mapping[str, GeneratedScenes]
     verdicts: pd.DataFrame
     """One row per verdict of the coarse bound, of both splits."""
@@ -94,7 +97,7 @@ def load_inputs(root: Path) -> Inputs:
         InputError: a file is missing or damaged; the message names the stage that makes it.
     """
     metrics = root / METRICS
-    geometry = metrics / "geometry.json"
+    geometry, spread = metrics / "geometry.json", root / REPORTS / "studies" / "spread.json"
     verdicts = [
         _frame(root / SEQUENCES / f"{split}.parquet", "enumerate_sequences", _VERDICTS).assign(
             split=split
@@ -119,6 +122,7 @@ def load_inputs(root: Path) -> Inputs:
             if policy in evaluated
         },
         geometry=read_object(geometry, "make bench") if geometry.exists() else None,
+        spread=read_object(spread, "make study") if spread.exists() else None,
         scenes={
             name: load_scenes(root / SCENES / f"{name}.json")
             for name in (

@@ -4,13 +4,14 @@ from pathlib import Path
 
 from guided_lgp.errors import InputError
 from guided_lgp.paths import REPORTS
+from guided_lgp.report.benchmarks import PAGE
 
 BEGIN = "<!-- results: written by make repro -->"
 END = "<!-- end of results -->"
 PARTS = ("findings", "table_1", "table_3_tree_size", "table_3_time")
 """Files of ``reports/tables`` that the README quotes."""
-OPTIONAL = ("geometry",)
-"""Those that are there once ``make bench`` has run."""
+OPTIONAL = ("draws", "geometry")
+"""Those that are there once ``make study`` and ``make bench`` have run."""
 
 
 def readme_block(root: Path) -> str:
@@ -29,6 +30,8 @@ def readme_block(root: Path) -> str:
             texts.append(path.read_text(encoding="utf-8"))
         elif name not in OPTIONAL:
             raise InputError(str(path), "is missing", "the output of stage render_reports")
+    if (root / PAGE).is_file():
+        texts.append(f"[Benchmarks]({PAGE}): both bounds, rivals, enumeration, training, memory.\n")
     return "\n".join(texts)
 
 

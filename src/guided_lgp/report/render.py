@@ -66,8 +66,7 @@ def run(params: Params, root: Path) -> None:
         scene = inputs.scenes[f"scalability_{setup}"].scenes[0]
         draw_scene(scene, reports / "figures" / f"setup_{setup}.png")
     replays = _replays(inputs, params.bounds, reports)
-    studies = "studies/studies.md" if (reports / "studies/studies.md").is_file() else None
-    document = compose(inputs, params, novelty, calls, written, replays, studies)
+    document = compose(inputs, params, novelty, calls, written, replays)
     (reports / "report.md").write_text(document.markdown(), encoding="utf-8")
     (reports / "report.html").write_text(document.html(reports), encoding="utf-8")
     logger.info("report: %s", reports / "report.html")
@@ -84,6 +83,7 @@ def _novelty(inputs: Inputs, params: Params) -> Mapping[str, str]:
 def _tables(inputs: Inputs, novelty: Mapping[str, str], calls: Mapping[str, float]) -> list[Table]:
     rejected = {name: (len(s.scenes), s.rejected) for name, s in inputs.scenes.items()}
     optional = [tables.geometry(inputs.geometry)] if inputs.geometry is not None else []
+    optional += [tables.draws(inputs.spread)] if inputs.spread is not None else []
     return [
         tables.generalization(inputs.generalization, calls),
         tables.unseen(analysis.by_novelty(inputs.problems, novelty), novelty),

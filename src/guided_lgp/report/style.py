@@ -13,6 +13,7 @@ PLANNERS = {
     "breadth_first": "Breadth-first",
     "breadth_first_graph": "Graph breadth-first",
     "astar": "A*",
+    "uniform_best_first": "Best-first, no policy",
     "guided": "Guided",
     "guided_best_first": "Guided best-first",
     "improved": "Improved",
@@ -22,7 +23,7 @@ PLANNERS = {
 }
 """Planners of the comparison of scalability, in the order of every table and legend."""
 
-RIVALS = ("breadth_first", "breadth_first_graph", "astar")
+RIVALS = ("breadth_first", "breadth_first_graph", "astar", "uniform_best_first")
 """Planners without a policy."""
 
 GUIDED = tuple(name for name in PLANNERS if name not in RIVALS)
@@ -36,6 +37,7 @@ PLANNER_STYLES = {
     "breadth_first": {"color": "#333333", "marker": "s"},
     "breadth_first_graph": {"color": "#E69F00", "marker": "^"},
     "astar": {"color": "#D55E00", "marker": "P"},
+    "uniform_best_first": {"color": "#56B4E9", "marker": "v"},
     "guided": {"color": POLICY_COLORS["paper"], **_GREEDY},
     "guided_best_first": {"color": POLICY_COLORS["paper"], **_BEST_FIRST},
     "improved": {"color": POLICY_COLORS["improved"], **_GREEDY},
