@@ -423,10 +423,12 @@ def mlflow_ui(
     """
     from guided_lgp import tracking
 
-    tracking.prepare()
-    typer.echo(f"MLflow: http://127.0.0.1:{port} (Ctrl-C ends it)")
+    experiment = tracking.prepare().get_experiment_by_name(tracking.EXPERIMENT)
+    address = f"http://127.0.0.1:{port}/#/experiments/{experiment.experiment_id}"
+    typer.echo(f"MLflow: {address} (Ctrl-C ends it)")
     command = [sys.executable, "-m", "mlflow", "server", "--host", "127.0.0.1"]
-    command += ["--port", str(port), "--backend-store-uri", tracking.tracking_uri()]
+    command += ["--port", str(port), "--workers", "1"]
+    command += ["--backend-store-uri", tracking.tracking_uri()]
     os.execv(sys.executable, command)
 
 

@@ -107,7 +107,9 @@ def prepare() -> Any:
     client = mlflow.MlflowClient(uri)
     if client.get_experiment_by_name(EXPERIMENT) is None:
         folder = Path(uri.removeprefix(SQLITE)).resolve().parent / "mlruns"
-        client.create_experiment(EXPERIMENT, folder.as_uri() if local else None)
+        # the kind makes the dashboard open on runs and charts, not on language models
+        tags = {"mlflow.experimentKind": "custom_model_development"}
+        client.create_experiment(EXPERIMENT, folder.as_uri() if local else None, tags)
     _end_killed(client)
     return client
 
