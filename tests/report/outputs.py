@@ -33,6 +33,7 @@ TREE: dict[str, tuple[float | None, ...]] = {
     "relational": (24.0, 43.0, 47.0, 92.0, 96.0, 110.0, 115.0, 200.0, 320.0, 480.0),
     "relational_best_first": (24.0, 42.0, 47.0, 91.0, 96.0, 109.0, 115.0, 198.0, 318.0, 470.0),
     "breadth_first_graph": (150.0, 40.0, 700.0, 5200.0, 9000.0, 60000.0, 150000.0, *[None] * 3),
+    "uniform_best_first": (50.0, 90.0, 120.0, 400.0, 700.0, 900.0, 2000.0, *[None] * 3),
     "astar": (60.0, 120.0, 90.0, 300.0, 260.0, 900.0, 800.0, 2000.0, 9000.0, None),
 }
 """Tree size by planner, in the order of the problems; None: stopped at the limit."""
@@ -124,6 +125,7 @@ def _write_generalization(root: Path, scenes: Any, rng: np.random.Generator) -> 
     shares["best_first"] = (0.99, 0.01, 0.0)
     shares |= {f"improved_{name}": share for name, share in shares.items()}
     shares |= {"relational": (0.995, 0.005, 0.0), "relational_best_first": (1.0, 0.0, 0.0)}
+    shares["uniform_best_first"] = (0.8, 0.15, 0.05)
     symbols = scenes[0].symbols
     objectives = one_goal_objectives(symbols) + two_goal_objectives(symbols)
     rows = [

@@ -124,6 +124,7 @@ def _enumeration(metrics: Metrics) -> Table:
 
 
 def _planners(metrics: Metrics) -> Table:
+    rivals = [name for name in RIVALS if all(name in row for row in metrics.values())]
     rows = []
     for problem in PROBLEMS:
         cells = metrics.get(problem.name)
@@ -132,7 +133,7 @@ def _planners(metrics: Metrics) -> Table:
         bases = {planner: search_time(cells[planner]) for planner in _GUIDED}
         row = [tables.label(problem), str(problem.k_min)]
         row += [f"{number(bases[planner], 3)}{_partial(cells[planner])}" for planner in _GUIDED]
-        for rival in RIVALS:
+        for rival in rivals:
             theirs = search_time(cells[rival])
             row += [_ratio(theirs, bases[planner]) + _partial(cells[rival]) for planner in _GUIDED]
         rows.append(tuple(row))
@@ -140,14 +141,14 @@ def _planners(metrics: Metrics) -> Table:
     return Table(
         "planners",
         "Guided search against each rival: time without the path bound",
-        ("Problem", "K", *(f"{name} (s)" for name in names), *names * len(RIVALS)),
+        ("Problem", "K", *(f"{name} (s)" for name in names), *names * len(rivals)),
         tuple(rows),
         (
             "Means over the objectives solved in one configuration per problem, symbolic, policy "
             "and coarse time. A rival's figure is its time divided by the guided planner's: above "
             f"1, guided search is faster. {NONE}: nothing solved. (k/n): k of n solved.",
         ),
-        (("", 4), *((f"{PLANNERS[rival]} takes, times", 2) for rival in RIVALS)),
+        (("", 4), *((f"{PLANNERS[rival]} takes, times", 2) for rival in rivals)),
     )
 
 

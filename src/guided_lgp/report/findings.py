@@ -205,8 +205,8 @@ def _rivals(metrics: Metrics, timing: Metrics) -> Iterator[str]:
     ):
         beaten = list(_beaten(metrics, figures, quantity, unit))
         yield from beaten or [
-            f"No rival (breadth-first, graph breadth-first, A*) {quantity} than guided search on "
-            "any problem that it solves completely."
+            f"No rival without a trained policy {quantity} than guided search on any problem that "
+            "it solves completely."
         ]
 
 

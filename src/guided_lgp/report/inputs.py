@@ -12,7 +12,7 @@ from guided_lgp.errors import InputError
 from guided_lgp.experiments.files import read_table
 from guided_lgp.experiments.problems import PROBLEMS, Problem
 from guided_lgp.paths import EVALUATION, METRICS, REPORTS, SCENES, SEQUENCES, TRAINING
-from guided_lgp.report.style import NETWORKS, POLICIES, VARIANTS
+from guided_lgp.report.style import NETWORKS, VARIANTS
 from guided_lgp.scene import GeneratedScenes, load_scenes
 
 Metrics = Mapping[str, Any]
@@ -118,7 +118,7 @@ def load_inputs(root: Path) -> Inputs:
                 network: read_object(root / TRAINING / file, stage)
                 for network, (file, stage) in _TRAINING[policy].items()
             }
-            for policy in POLICIES
+            for policy in _TRAINING
             if policy in evaluated
         },
         geometry=read_object(geometry, "make bench") if geometry.exists() else None,

@@ -6,8 +6,9 @@ POLICIES = {
     "paper": "Paper's networks",
     "improved": "Improved networks",
     "relational": "Relational policy",
+    "uniform": "No policy (control)",
 }
-"""The trained policies, in the order of every table."""
+"""The policies, in the order of every table; the last one finds all actions equally good."""
 
 PLANNERS = {
     "breadth_first": "Breadth-first",
@@ -24,7 +25,7 @@ PLANNERS = {
 """Planners of the comparison of scalability, in the order of every table and legend."""
 
 RIVALS = ("breadth_first", "breadth_first_graph", "astar", "uniform_best_first")
-"""Planners without a policy."""
+"""Planners without a trained policy."""
 
 GUIDED = tuple(name for name in PLANNERS if name not in RIVALS)
 """Planners with one."""
@@ -55,11 +56,6 @@ class Variant:
     policy: str
     search: str
 
-    @property
-    def label(self) -> str:
-        """Policy and search."""
-        return f"{POLICIES[self.policy]}, {self.search}"
-
 
 VARIANTS = {
     "default": Variant("paper", "default"),
@@ -70,6 +66,7 @@ VARIANTS = {
     "improved_best_first": Variant("improved", "best-first"),
     "relational": Variant("relational", "objective adaptation"),
     "relational_best_first": Variant("relational", "best-first"),
+    "uniform_best_first": Variant("uniform", "best-first"),
 }
 """Planners of the test of generalization, in the order of Table I."""
 

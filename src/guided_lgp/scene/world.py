@@ -30,6 +30,8 @@ COLOURS: dict[str, tuple[float, float, float]] = {
     "orange": (0.95, 0.52, 0.12),
     "white": (0.92, 0.92, 0.92),
     "black": (0.15, 0.15, 0.15),
+    "pink": (0.95, 0.58, 0.72),
+    "brown": (0.45, 0.28, 0.15),
     "tray": (0.45, 0.45, 0.47),
 }
 """Colour of a body named after it; RGB in 0..1."""
