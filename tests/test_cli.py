@@ -167,7 +167,7 @@ def test_a_floating_box(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> N
 
 def test_missing_models_name_the_stage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     goal = ["--goal", "(held red)", "--models", str(tmp_path)]
-    assert "train_policy" in rejected(capsys, "plan", str(SCENE), *goal)
+    assert "train_relational" in rejected(capsys, "plan", str(SCENE), *goal)
 
 
 def test_impossible_parameters_stop_a_stage(

@@ -153,7 +153,7 @@ def plan(
             help="Which trained policy. paper: its networks, for 3 boxes and 2 tables; improved: "
             "the same networks, better trained; relational: for any number of boxes and tables."
         ),
-    ] = Policy.PAPER,
+    ] = Policy.RELATIONAL,
     max_nodes: Annotated[
         int,
         typer.Option(min=1, metavar="N", help="Give up when the search tree has N nodes."),

@@ -60,7 +60,7 @@ def plan(
     objective: str | Iterable[Goal | str],
     planner: Planner = "guided",
     *,
-    policy: str = "paper",
+    policy: str = "relational",
     models: Path = MODELS,
     params: Params | None = None,
     max_nodes: int | None = None,
