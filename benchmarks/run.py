@@ -21,13 +21,12 @@ from typing import Any
 import coarse
 import path
 import pipeline
-import search
 from guided_lgp.documents import read_json, write_json
 from guided_lgp.paths import METRICS
 from guided_lgp.report.benchmarks import PAGE, benchmark_page
 
 ROOT = Path(__file__).parents[1]
-PACKAGES = ("casadi", "pybullet", "pin", "coal", "ompl", "toppra", "numpy", "torch")
+PACKAGES = ("casadi", "pybullet", "pin", "coal", "toppra", "numpy", "torch")
 logger = logging.getLogger("benchmarks")
 
 
@@ -52,7 +51,6 @@ def main(parts: list[str], count: int) -> None:
         "path_bound": partial(path.measure, count),
         "enumeration": pipeline.enumeration,
         "planners": pipeline.planners,
-        "search": partial(search.measure, ROOT),
         "training": pipeline.training,
         "memory": pipeline.memory,
     }

@@ -4,6 +4,7 @@ from guided_lgp.report.document import (
     Block,
     Bullets,
     Document,
+    Folded,
     Gallery,
     Links,
     Picture,
@@ -22,6 +23,7 @@ def test_every_kind_of_block_is_written_and_escaped(tmp_path: Path) -> None:
         NAME,
         Bullets([NAME]),
         table,
+        Folded(table),
         Picture("a.svg", NAME, NAME),
         Gallery([Picture("a.svg", NAME)]),
         Links([("replays/a.html", NAME)]),
@@ -34,6 +36,8 @@ def test_every_kind_of_block_is_written_and_escaped(tmp_path: Path) -> None:
     text = document.markdown()
     assert "<img" not in text.replace(r"\<img", "")
     assert text.count("(figures/a.svg)") == 2
+    assert page.count("<details>") == 1
+    assert page.count("</table>") == 2
     assert "](replays/a.html)" in text
 
 
