@@ -60,9 +60,8 @@ POLICIES = Path("data/studies")
 RESULTS = REPORTS / "studies"
 
 Row = dict[str, Any]
-Planner = Literal["default", "adaptation", "best_first"]
 
-PLANNERS: Mapping[Planner, Callable[..., SearchResult]] = {
+PLANNERS: Mapping[str, Callable[..., SearchResult]] = {
     "default": partial(guided.plan, adapt=False),
     "adaptation": guided.plan,
     "best_first": best_first.plan,
@@ -89,7 +88,6 @@ class Case(Section):
     """How samples for early stopping are chosen."""
     shuffled: Annotated[bool, Field(strict=True)] = False
     """Whether the actions of all samples are exchanged at random."""
-    planners: tuple[Planner, ...] = ("default", "adaptation", "best_first")
 
 
 class Training(Section):
@@ -237,10 +235,13 @@ def evaluate(root: Path) -> None:
     """
     study, params = load_study(root)
     scenes = load_scenes(root / SCENES / "test.json").scenes
-    lengths: dict[str, dict[str, int | None]] = {scene.name: {} for scene in scenes}
     path = root / SEQUENCES / "test_shortest.parquet"
+    lengths: dict[str, dict[str, int | None]] = {}
     for row in read_table(path, "enumerate_sequences", ["configuration", "objective", "length"]):
-        lengths[row["configuration"]][row["objective"]] = row["length"]
+        lengths.setdefault(row["configuration"], {})[row["objective"]] = row["length"]
+    for scene in scenes:
+        if scene.name not in lengths:
+            raise InputError(str(path), f"lacks {scene.name}", "the sequences of the same scenes")
     tasks = [
         _Evaluation(scene, lengths[scene.name], study, params.bounds, root) for scene in scenes
     ]
@@ -252,7 +253,7 @@ def evaluate(root: Path) -> None:
         figures = {
             name: {
                 planner: _by_subset([rows[run] for run in rows if run[::2] == (name, planner)])
-                for planner in study.cases[name].planners
+                for planner in PLANNERS
             }
             for name in content.cases
         }
@@ -300,10 +301,10 @@ def _evaluate(task: _Evaluation) -> list[Row]:
     return rows
 
 
-def _runs(study: StudyParams) -> Iterator[tuple[str, int, Planner]]:
+def _runs(study: StudyParams) -> Iterator[tuple[str, int, str]]:
     for name, case in study.cases.items():
         for seed in study.seeds[: case.seeds]:
-            for planner in case.planners:
+            for planner in PLANNERS:
                 yield name, seed, planner
 
 

@@ -51,11 +51,8 @@ def _table(name: str, content: StudyTable, figures: Figures, study: StudyParams)
         title = study.cases[case].title
         cells = [title, str(study.cases[case].seeds)]
         for planner in PLANNERS:
-            subsets = figures[case].get(planner)
-            cells += [
-                "–" if subsets is None else _cell(subsets[subset][outcome])
-                for outcome, subset in SHOWN
-            ]
+            subsets = figures[case][planner]
+            cells += [_cell(subsets[subset][outcome]) for outcome, subset in SHOWN]
         rows.append(tuple(cells))
         records += _records(case, title, figures[case])
     own = study.training.paper
