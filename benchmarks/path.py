@@ -29,7 +29,6 @@ LENGTHS = (2, 4, 6, 8, 10)
 SEED = 20_000
 """Of scenes and sequences; no stage of the pipeline uses it."""
 CONFIGURATIONS = 10
-TRIES, SOLUTIONS = 9, 8
 
 
 @dataclass(frozen=True)
@@ -73,8 +72,9 @@ class Task:
 def run_task(task: Task) -> list[Sample]:
     """Plan and carry out the sequences of a task."""
     rng = np.random.default_rng([SEED, task.length, task.number])
-    coarse = CoarseBound(task.scene, TRIES)
-    path = PathBound(task.scene, coarse, SOLUTIONS)
+    bounds = load_params(ROOT / PARAMS).bounds
+    coarse = CoarseBound(task.scene, bounds.coarse_tries)
+    path = PathBound(task.scene, coarse, bounds.path_solutions)
     return [_sample(task.length, task.scene, coarse, path, rng) for _ in range(task.count)]
 
 

@@ -13,7 +13,6 @@ import logging
 import os
 import platform
 from collections.abc import Callable
-from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -45,21 +44,24 @@ def machine() -> dict[str, Any]:
     }
 
 
+MEASURES: dict[str, Callable[[int], Any]] = {
+    "coarse_bound": coarse.measure,
+    "path_bound": path.measure,
+    "enumeration": lambda count: pipeline.enumeration(),
+    "planners": lambda count: pipeline.planners(),
+    "training": lambda count: pipeline.training(),
+    "memory": lambda count: pipeline.memory(),
+}
+"""By part, what measures it, given the number of sequences per length."""
+
+
 def main(parts: list[str], count: int) -> None:
-    measures: dict[str, Callable[[], Any]] = {
-        "coarse_bound": partial(coarse.measure, count),
-        "path_bound": partial(path.measure, count),
-        "enumeration": pipeline.enumeration,
-        "planners": pipeline.planners,
-        "training": pipeline.training,
-        "memory": pipeline.memory,
-    }
     target = ROOT / METRICS / "benchmark.json"
     figures = read_json(target, "an earlier run of all parts") if parts else {}
     figures["machine"] = machine()
-    for name in parts or measures:
+    for name in parts or MEASURES:
         logger.info(name)
-        figures[name] = measures[name]()
+        figures[name] = MEASURES[name](count)
         write_json(target, figures)
     geometry: dict[str, dict[str, Any]] = {}
     for bound in ("coarse_bound", "path_bound"):
@@ -77,4 +79,6 @@ if __name__ == "__main__":
     parser.add_argument("parts", nargs="*", help="those to measure again, all by default")
     parser.add_argument("--count", type=int, default=100, help="sequences per length")
     arguments = parser.parse_args()
+    if unknown := set(arguments.parts) - set(MEASURES):
+        parser.error(f"no part {', '.join(sorted(unknown))}; there are {', '.join(MEASURES)}")
     main(arguments.parts, arguments.count)

@@ -6,40 +6,23 @@ Run after the pipeline, which makes the scenes and the models: python benchmarks
 import json
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from statistics import fmean
 from typing import Any
 
-import numpy as np
-
 from guided_lgp.experiments.problems import PROBLEMS
-from guided_lgp.logic import Action, Objective, State, one_goal_objectives, two_goal_objectives
+from guided_lgp.logic import Objective, one_goal_objectives, two_goal_objectives
 from guided_lgp.nlp.bounds import SceneBounds
-from guided_lgp.nlp.results import Array
 from guided_lgp.params import Params, load_params
 from guided_lgp.paths import PARAMS, SCENES, TRAINED
 from guided_lgp.policy.inference import POLICIES, load_policy
 from guided_lgp.scene import Scene, load_scenes
 from guided_lgp.search import best_first, guided
 from guided_lgp.search.enumerate import enumerate_sequences
-from guided_lgp.search.policy import Policy
+from guided_lgp.search.policy import Policy, Uniform
 from guided_lgp.search.result import SearchResult
 from guided_lgp.search.tree import LogicTree
-
-
-class Uniform:
-    """The policy that knows nothing: what the best-first search does without one."""
-
-    def log_probabilities(
-        self,
-        objective: Objective,
-        state: State,
-        positions: Mapping[str, Array],
-        actions: Sequence[Action],
-    ) -> Array:
-        """See :class:`guided_lgp.search.policy.Policy`."""
-        return np.full(len(actions), -np.log(len(actions)))
 
 
 def measure(root: Path) -> dict[str, Any]:

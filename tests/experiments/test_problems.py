@@ -6,7 +6,7 @@ from guided_lgp.experiments.problems import PROBLEMS, Problem
 from guided_lgp.logic import Symbols, contradiction, format_objective
 from guided_lgp.logic.strips import facts, goal_facts, relaxed_operators
 from guided_lgp.scene import generate
-from guided_lgp.search.landmark_cut import landmark_cut
+from guided_lgp.search.landmark_cut import LandmarkCut
 
 
 def test_counts_and_names() -> None:
@@ -31,7 +31,7 @@ def test_objectives_need_the_stated_number_of_actions(problem: Problem) -> None:
     for objective in objectives:
         assert contradiction(objective) is None
         # At least so many by the landmarks, and no more: every goal takes one grasp, one place.
-        bound = landmark_cut(facts(scene.state, symbols), goal_facts(objective), operators)
+        bound = LandmarkCut(goal_facts(objective), operators)(facts(scene.state, symbols))
         assert bound == problem.k_min == 2 * len(objective)
 
 

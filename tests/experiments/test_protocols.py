@@ -97,8 +97,8 @@ def test_generalization(params: Params, monkeypatch: pytest.MonkeyPatch) -> None
             Path("models"),
         )
     )
-    assert len(rows) == 8 * 87
-    assert sum(row["unseen"] for row in rows) == 8 * 47
+    assert len(rows) == 9 * 87
+    assert sum(row["unseen"] for row in rows) == 9 * 47
     by_text = {format_objective(objective): objective for objective in objectives}
     for row in rows:
         objective = by_text[row["objective"]]

@@ -49,6 +49,7 @@ def test_table_one() -> None:
         "improved_best_first",
         "relational",
         "relational_best_first",
+        "uniform_best_first",
     ]
 
 

@@ -29,7 +29,7 @@ from guided_lgp.policy.inference import POLICIES, load_policy
 from guided_lgp.scene import Scene, load_scenes
 from guided_lgp.search import best_first, breadth_first, classical, graph, guided
 from guided_lgp.search.bounds import Bounds
-from guided_lgp.search.policy import Policy
+from guided_lgp.search.policy import Policy, Uniform
 from guided_lgp.search.result import SearchResult
 
 Row = dict[str, Any]
@@ -46,8 +46,10 @@ GUIDED: dict[str, tuple[str, Callable[..., SearchResult]]] = {
     "improved_best_first": ("improved", best_first.plan),
     "relational": ("relational", guided.plan),
     "relational_best_first": ("relational", best_first.plan),
+    "uniform_best_first": ("uniform", best_first.plan),
 }
-"""Policy and search of each guided planner."""
+"""Policy and search of each guided planner. The uniform policy knows nothing: the control that
+shows what the best-first search owes to its bound on the missing actions alone."""
 
 COUNTS = ("expansions", "policy_calls", "coarse_calls", "path_calls")
 TIMES = ("symbolic", "policy", "coarse", "path")
@@ -137,7 +139,8 @@ def _planners(
     """Every planner, by name, as a function of the objective alone."""
     symbols = task.scene.symbols
     unguided_symbols = problem.unguided_symbols(symbols)
-    policies = {name: load_policy(task.models, name) for name in POLICIES}
+    policies: dict[str, Policy] = {name: load_policy(task.models, name) for name in POLICIES}
+    policies["uniform"] = Uniform()
     depth = max(task.limits.max_depth, 2 * problem.k_min)
     limits = task.limits.model_copy(update={"max_depth": depth})
 

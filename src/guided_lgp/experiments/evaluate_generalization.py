@@ -37,7 +37,7 @@ from guided_lgp.policy.split import training_objectives
 from guided_lgp.scene import Scene, load_scenes
 from guided_lgp.search import best_first, guided
 from guided_lgp.search.bounds import Bounds
-from guided_lgp.search.policy import Policy
+from guided_lgp.search.policy import Policy, Uniform
 from guided_lgp.search.result import SearchResult
 
 Row = dict[str, Any]
@@ -51,8 +51,10 @@ PLANNERS: Mapping[str, tuple[str, Callable[..., SearchResult]]] = {
     "improved_best_first": ("improved", best_first.plan),
     "relational": ("relational", guided.plan),
     "relational_best_first": ("relational", best_first.plan),
+    "uniform_best_first": ("uniform", best_first.plan),
 }
-"""Policy and search of each row of Table I; all but the ``default`` ones adapt the objective."""
+"""Policy and search of each row of Table I; all but the ``default`` ones adapt the objective. The
+uniform policy is the control: what best-first search does without a policy."""
 
 OUTCOMES = ("shortest", "feasible", "no_solution")
 
@@ -146,7 +148,8 @@ def evaluate(task: Task) -> list[Row]:
     """Rows of one configuration: every objective by every planner."""
     symbols = task.scene.symbols
     bounds = SceneBounds(task.scene, task.bounds)
-    policies = {name: load_policy(task.models, name) for name in POLICIES}
+    policies: dict[str, Policy] = {name: load_policy(task.models, name) for name in POLICIES}
+    policies["uniform"] = Uniform()
     known = [parse_skeleton(text) for text in task.sequences]
     return [
         row

@@ -3,6 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import Protocol
 
+import numpy as np
+
 from guided_lgp.logic import Action, Objective, State
 from guided_lgp.nlp.results import Array
 
@@ -30,3 +32,17 @@ class Policy(Protocol):
             (len(actions),) natural logarithms of the policy's probabilities.
         """
         ...
+
+
+class Uniform:
+    """The policy that knows nothing: shows what a search does without one."""
+
+    def log_probabilities(
+        self,
+        objective: Objective,
+        state: State,
+        positions: Mapping[str, Array],
+        actions: Sequence[Action],
+    ) -> Array:
+        """See :class:`Policy`."""
+        return np.full(len(actions), -np.log(len(actions)))
