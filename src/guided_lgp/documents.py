@@ -9,8 +9,8 @@ from typing import Any
 
 from guided_lgp.errors import InputError
 
-LARGEST = 256 * 2**20
-"""Bytes that a document may have: 100 times those of the largest that the program writes."""
+LARGEST = 2**31
+"""Bytes that a document may have: twice those of the scenes of a million configurations."""
 
 
 def read_json(path: Path, accepted: str = "") -> Any:

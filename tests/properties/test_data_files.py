@@ -24,18 +24,20 @@ from bad_input import (
 )
 from hypothesis import given
 from hypothesis import strategies as st
-from safetensors.numpy import save_file
+from safetensors.numpy import load_file, save_file
 
 from guided_lgp.experiments.enumerate_sequences import SHORTEST, VERDICTS
 from guided_lgp.experiments.files import read_table, write_table
 from guided_lgp.logic import Symbols, two_goal_objectives
+from guided_lgp.nlp.plan_file import read_plan
 from guided_lgp.policy.dataset import Dataset, load_dataset
 from guided_lgp.policy.encoding import CHAINS, Encoding
 from guided_lgp.policy.inference import load_policy
 from guided_lgp.policy.models import Model, load_model
 from guided_lgp.policy.samples import build_dataset
 from guided_lgp.report.inputs import read_object
-from guided_lgp.scene import GeneratedScenes, generate, load_scenes
+from guided_lgp.scene import GeneratedScenes, generate, load_scene, load_scenes
+from guided_lgp.scene.setups import SETUPS
 
 SYMBOLS = Symbols(("pr2L", "pr2R"), ("red", "green", "blue"), ("tab1", "tab2"))
 OBJECTIVES = tuple(two_goal_objectives(SYMBOLS)[:5])
@@ -56,9 +58,42 @@ def test_spoilt_scene_files(data: st.DataObject, scenes: Path, folder: Path) -> 
     index = data.draw(st.integers(0, 2))
     document["scenes"][index] = data.draw(spoilt(document["scenes"][index]))
     file = write_json(folder / "spoilt.json", document)
-    found = answer(lambda: load_scenes(file), f"{file}: scenes.{index}")
+    found = answer(lambda: load_scenes(file), f"{file}: scenes.{index}", f"{file}: is not JSON")
     if found is not None:
         assert len(found.scenes) == 3
+
+
+@examples(150)
+@given(data=st.data())
+def test_spoilt_lists_of_scenes(data: st.DataObject, scenes: Path, folder: Path) -> None:
+    """Faults anywhere in the file: its version, its setup, the list, a scene."""
+    document = data.draw(spoilt(json.loads(scenes.read_text(encoding="utf-8"))))
+    file = write_json(folder / "spoilt.json", document)
+    found = answer(lambda: load_scenes(file), file)
+    if found is not None:
+        assert found.setup in SETUPS
+        assert found.rejected >= 0
+        assert len(found.scenes) == len(document["scenes"]) > 0
+
+
+DEEP = ("[" * 100_000, '{"a":' * 100_000, "[" * 100_000 + "]" * 100_000)
+
+
+@pytest.mark.parametrize("content", DEEP, ids=("lists", "mappings", "closed"))
+def test_deep_documents(
+    content: str, dataset: Path, models: Path, tables: Mapping[str, Path], folder: Path
+) -> None:
+    target = copy_files(models, copy_files(dataset, folder / "deep"))
+    files = [target / name for name in ("scene", "plan", "metrics", "dataset", "grasp")]
+    for name in files:
+        name.with_suffix(".json").write_text(content)
+    scene, plan, metrics, samples, model = (file.with_suffix(".json") for file in files)
+    assert answer(lambda: load_scene(scene), scene) is None
+    assert answer(lambda: load_scenes(scene), scene) is None
+    assert answer(lambda: read_plan(plan), plan) is None
+    assert answer(lambda: read_object(metrics, STAGE), metrics) is None
+    assert answer(lambda: load_dataset(target), samples) is None
+    assert answer(lambda: load_model(target, "grasp"), model) is None
 
 
 @examples(100)
@@ -121,12 +156,24 @@ def test_truncated_tables(
 def test_garbled_tables(
     name: str, data: st.DataObject, tables: Mapping[str, Path], folder: Path
 ) -> None:
-    """Other bytes among the values: the footer, which describes the columns, stays."""
+    """Other bytes anywhere: among the values, in the description of a page, in the footer."""
+    file = folder / "garbled.parquet"
+    file.write_bytes(data.draw(overwritten(tables[name].read_bytes())))
+    table(file, COLUMNS[name])
+
+
+@examples(150)
+@given(name=st.sampled_from(("verdicts", "shortest")), data=st.data())
+def test_garbled_values_are_not_taken_for_others(
+    name: str, data: st.DataObject, tables: Mapping[str, Path], folder: Path
+) -> None:
+    """Each page has a checksum of its values."""
     content = tables[name].read_bytes()
     footer = len(content) - 8 - struct.unpack("<I", content[-8:-4])[0]
-    file = folder / "garbled.parquet"
+    file = folder / "values.parquet"
     file.write_bytes(data.draw(overwritten(content[:footer])) + content[footer:])
-    table(file, COLUMNS[name])
+    found = table(file, COLUMNS[name])
+    assert found is None or found == read_table(tables[name], STAGE, COLUMNS[name])
 
 
 @examples(60)
@@ -151,24 +198,22 @@ def test_tables_of_another_make(
     assert (rows is not None) == (version == b"1" and set(wanted) <= set(columns))
 
 
-@examples(120)
-@given(
-    name=st.sampled_from(("verdicts", "shortest")),
-    how=st.sampled_from(("truncate", "random")),
-    data=st.data(),
-)
+@examples(150)
+@given(name=st.sampled_from(("verdicts", "shortest")), data=st.data())
 def test_a_data_set_from_damaged_tables(
-    name: str, how: str, data: st.DataObject, scenes: Path, tables: Mapping[str, Path], folder: Path
+    name: str, data: st.DataObject, scenes: Path, tables: Mapping[str, Path], folder: Path
 ) -> None:
     file = folder / "damaged.parquet"
     content = tables[name].read_bytes()
-    file.write_bytes(data.draw(truncated(content) if how == "truncate" else st.binary(max_size=99)))
+    file.write_bytes(data.draw(garbled(content)))
     paths = {**tables, name: file}
     found = load_scenes(scenes).scenes
     built = answer(
         lambda: build_dataset(found, paths["verdicts"], paths["shortest"], OBJECTIVES, 0), file
     )
-    assert built is None
+    if built is not None:
+        whole = build_dataset(found, tables["verdicts"], tables["shortest"], OBJECTIVES, 0)
+        assert np.array_equal(built.states, whole.states)
 
 
 @pytest.fixture(scope="module")
@@ -199,14 +244,17 @@ def copy_files(source: Path, target: Path) -> Path:
     return target
 
 
-@examples(120)
-@given(how=st.sampled_from(("truncate", "random")), data=st.data())
-def test_damaged_samples(how: str, data: st.DataObject, dataset: Path, folder: Path) -> None:
+@examples(250)
+@given(data=st.data())
+def test_damaged_samples(data: st.DataObject, dataset: Path, folder: Path) -> None:
     target = copy_files(dataset, folder / "dataset-2")
     file = target / "samples.npz"
-    damage = truncated(file.read_bytes()) if how == "truncate" else st.binary(max_size=200)
-    file.write_bytes(data.draw(damage))
-    assert answer(lambda: load_dataset(target), file) is None
+    file.write_bytes(data.draw(garbled(file.read_bytes())))
+    found = answer(lambda: load_dataset(target), file)
+    if found is not None:
+        whole = load_dataset(dataset)
+        assert np.array_equal(found.states, whole.states)
+        assert np.array_equal(found.sample_state, whole.sample_state)
 
 
 @examples(60)
@@ -322,6 +370,47 @@ def test_weights_of_another_shape(
     file = target / "grasp.safetensors"
     save_file({f"gripper.0.{part}": np.zeros(shape, np.float32)}, file)
     assert answer(lambda: load_model(target, "grasp"), f"{file}: gripper.0") is None
+
+
+@examples(100)
+@given(
+    number=st.sampled_from((np.nan, np.inf, -np.inf)),
+    network=st.sampled_from(sorted(CHAINS)),
+    data=st.data(),
+)
+def test_weights_that_are_no_numbers(
+    number: float, network: str, data: st.DataObject, models: Path, folder: Path
+) -> None:
+    target = copy_files(models, folder / "models-7")
+    file = target / f"{network}.safetensors"
+    tensors = load_file(file)
+    spoiled = tensors[data.draw(st.sampled_from(sorted(tensors)))].reshape(-1)
+    spoiled[data.draw(st.integers(0, spoiled.size - 1))] = number
+    save_file(tensors, file)
+    assert answer(lambda: load_model(target, network), file) is None
+
+
+@examples(150)
+@given(network=st.sampled_from(sorted(CHAINS)), data=st.data())
+def test_spoilt_descriptions_of_models(
+    network: str, data: st.DataObject, models: Path, folder: Path
+) -> None:
+    target = copy_files(models, folder / "models-8")
+    file = target / f"{network}.json"
+    write_json(file, data.draw(spoilt(json.loads(file.read_text(encoding="utf-8")))))
+    found = answer(lambda: load_model(target, network), file, file.with_suffix(".safetensors"))
+    check_model(found, network)
+
+
+@examples(150)
+@given(data=st.data())
+def test_spoilt_descriptions_of_the_data_set(
+    data: st.DataObject, dataset: Path, folder: Path
+) -> None:
+    target = copy_files(dataset, folder / "dataset-5")
+    file = target / "dataset.json"
+    write_json(file, data.draw(spoilt(json.loads(file.read_text(encoding="utf-8")))))
+    answer(lambda: load_dataset(target), file, target / "samples.npz")
 
 
 @examples(150)

@@ -16,6 +16,7 @@ from guided_lgp.logic import (
     Objective,
     State,
     format_objective,
+    format_skeleton,
     parse_objective,
     parse_skeleton,
     satisfied,
@@ -131,12 +132,23 @@ def test_circles_and_too_many_held(names: list[str], unknown: int, scene: Scene)
     assert accepted(held) == (unknown == 0 and len(names) in (1, 2))
 
 
+actions = st.builds(
+    "({} {} {})".format,
+    st.sampled_from(("grasp", "place", "push", "Grasp")),
+    st.sampled_from(("pr2L", "pr2R", "pr2L pr2R")),
+    st.sampled_from(("red", "red tab1", "red green", "")),
+)
+remains = st.sampled_from((" ", ";", "(", ")", "grasp", "\n", "x"))
+
+
 @examples(200)
-@given(text=phrases)
+@given(text=phrases | st.lists(actions | remains, max_size=6).map("".join))
 def test_anything_read_as_a_sequence(text: str) -> None:
+    """What is read as a skeleton is one from its first character to its last."""
     skeleton = answer(lambda: parse_skeleton(text), "action")
     if skeleton is not None:
         assert all(action.instruction in ("grasp", "place") for action in skeleton)
+        assert format_skeleton(skeleton).replace(" ", "") == "".join(text.split())
 
 
 @examples(60)

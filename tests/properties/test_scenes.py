@@ -126,6 +126,31 @@ def test_handmade_scenes_are_accepted_only_if_they_stand(document: dict[str, Any
         check_geometry(scene)
 
 
+NUMBERS = (
+    "yaw",
+    *(("position", axis) for axis in range(3)),
+    *(("size", axis) for axis in range(3)),
+)
+
+
+@examples(60)
+@given(
+    field=st.sampled_from(NUMBERS),
+    value=st.booleans() | st.sampled_from(("0.4", "", "1e-1", "nan", None, [0.4], {}, 1e-9, 1e300)),
+)
+def test_only_numbers_of_a_sensible_size_are_numbers(
+    field: str | tuple[str, int], value: Any, scene_document: dict[str, Any]
+) -> None:
+    document = copy.deepcopy(scene_document)
+    box = document["boxes"][0]
+    match field:
+        case (name, axis):
+            box[name][axis] = value
+        case name:
+            box[name] = value
+    assert (accepted(document) is None) or (value == 1e-9 and field in ("yaw", ("position", 0)))
+
+
 @examples(500)
 @given(data=st.data())
 def test_spoilt_documents(
