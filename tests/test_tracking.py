@@ -27,6 +27,7 @@ ROOT = Path(__file__).parents[1]
 PARAMS = load_params(ROOT / "params.yaml")
 METRICS = {
     "version": 1,
+    "seed": 5,
     "sub_policies": {"box": {"accuracy": 0.9, "curves": {"loss": [2.0, 1.0, 0.5]}}},
     "note": "text",
     "nan": None,

@@ -318,7 +318,8 @@ def _read_metrics(file: Path) -> dict[str, list[float]]:
     for path, value in flatten(document if isinstance(document, dict) else {}, "/").items():
         name = "/".join(part for part in path.split("/") if part not in ("sub_policies", "curves"))
         values = value if isinstance(value, list) else [value]
-        if name != "version" and values and all(_is_number(item) for item in values):
+        measured = name not in ("version", "seed")
+        if measured and values and all(_is_number(item) for item in values):
             metrics[name] = [float(item) for item in values]
     return metrics
 
