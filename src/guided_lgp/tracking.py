@@ -432,5 +432,6 @@ def _attempt(action: Callable[[], Value]) -> Value | None:
     try:
         return action()
     except Exception as error:
-        logger.warning("MLflow: not recorded: %s: %s", type(error).__name__, error)
+        reason = " ".join(str(error).split())
+        logger.warning("MLflow: not recorded: %s: %s", type(error).__name__, reason)
         return None
