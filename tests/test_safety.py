@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import psutil
@@ -199,7 +200,7 @@ def test_servers_listen_on_the_loopback_interface(
         assert listening(psutil.Process()) == {"127.0.0.1"}
 
     commands: list[list[str]] = []
-    monkeypatch.setattr(tracking, "prepare", lambda: None)
+    monkeypatch.setattr(tracking, "prepare", Mock())
     monkeypatch.setattr(os, "execv", lambda program, command: commands.append(command))
     with pytest.raises(SystemExit):
         cli.main(["mlflow", "ui", "--port", "5001"])
