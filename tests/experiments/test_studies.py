@@ -171,6 +171,7 @@ def test_the_declared_studies() -> None:
     for name in ("paper", "improved", "relational"):
         case = study.cases[name]
         assert case.seeds >= 3
+        assert case.training == "full"
         assert case.configurations == pipeline.generate_scenes.training_configurations
         assert case.objectives == pipeline.build_dataset.training_objectives
     assert study.cases["improved"].variant == pipeline.build_dataset.improved

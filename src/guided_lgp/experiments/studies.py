@@ -76,6 +76,8 @@ class Case(Section):
     title: str
     policy: Literal["paper", "improved", "relational"]
     """Whose training: the paper's networks (Table IV), the improved variant or the relational."""
+    training: Literal["short", "full"] = "short"
+    """The shorter training of ``studies/params.yaml``, or the pipeline's own."""
     variant: Variant = Variant()
     """How samples are made and encoded."""
     seeds: Annotated[int, Field(strict=True, ge=1)]
@@ -159,7 +161,7 @@ def train(root: Path, name: str) -> None:
     if name not in study.cases:
         raise InputError(f"case {name!r}", "is unknown", ", ".join(study.cases))
     case = study.cases[name]
-    settings: TrainPolicy | TrainRelational = getattr(study.training, case.policy)
+    settings = _settings(case, study, params)
     tasks = [
         _Training(
             case=case,
@@ -172,6 +174,16 @@ def train(root: Path, name: str) -> None:
         for seed in study.seeds[: case.seeds]
     ]
     parallel.run(_train, tasks, params.parallel, f"training {name}")
+
+
+def _settings(case: Case, study: StudyParams, params: Params) -> TrainPolicy | TrainRelational:
+    stages: dict[str, TrainPolicy | TrainRelational] = {
+        "paper": params.train_policy,
+        "improved": params.train_improved,
+        "relational": params.train_relational,
+    }
+    short: TrainPolicy | TrainRelational = getattr(study.training, case.policy)
+    return stages[case.policy] if case.training == "full" else short
 
 
 def _train(task: _Training) -> None:

@@ -67,8 +67,10 @@ def _table(name: str, content: StudyTable, figures: Figures, study: StudyParams)
             "and the 87 objectives; mean ± standard deviation over runs, each with its own draw of "
             "the training objectives and its own seed. No plan: of all objectives.",
             "A sequence with a coarse bound counts as a plan; the path bound is not asked.",
-            f"Training differs from Table IV in the batches ({own.place.batch}), the learning rate "
-            f"({own.place.lr:g}) and the epochs (at most {own.place.epochs}, patience "
+            "Trained as in the pipeline."
+            if all(study.cases[case].training == "full" for case in content.cases)
+            else f"Training differs from Table IV in the batches ({own.place.batch}), the learning "
+            f"rate ({own.place.lr:g}) and the epochs (at most {own.place.epochs}, patience "
             f"{own.patience}).",
         ),
         records=records,

@@ -144,8 +144,7 @@ def draws(metrics: Metrics) -> Table:
         tuple(rows),
         (
             "Mean ± standard deviation over the draws, from make study. Policies are trained anew "
-            "for every draw, for fewer epochs than those above, and a sequence counts as a plan "
-            "once it has a coarse bound.",
+            "for every draw, and a sequence counts as a plan once it has a coarse bound.",
         ),
         (("", 1), *((label, 2) for label in searches.values()), ("n", 1)),
         records=records,
