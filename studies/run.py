@@ -1,11 +1,11 @@
-"""The stages of studies/dvc.yaml: train CASE, evaluate, render."""
+"""The stages of studies/dvc.yaml: train CASE, evaluate, feasibility, render."""
 
 import logging
 import sys
 from pathlib import Path
 
 from guided_lgp.errors import InputError
-from guided_lgp.experiments import studies
+from guided_lgp.experiments import feasibility, studies
 from guided_lgp.report.studies import render
 
 logging.basicConfig(format="%(message)s", level=logging.INFO)
@@ -15,10 +15,14 @@ try:
             studies.train(Path.cwd(), case)
         case ["evaluate"]:
             studies.evaluate(Path.cwd())
+        case ["feasibility"]:
+            feasibility.run(Path.cwd())
         case ["render"]:
             render(Path.cwd())
         case words:
-            raise InputError(" ".join(words), "is no stage", "train CASE, evaluate, render")
+            raise InputError(
+                " ".join(words), "is no stage", "train CASE, evaluate, feasibility, render"
+            )
 except InputError as error:
     print(f"error: {error}", file=sys.stderr)
     sys.exit(2)

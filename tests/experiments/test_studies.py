@@ -1,6 +1,7 @@
 """The studies at a tiny scale, and their declaration."""
 
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import yaml
 from test_protocols import NothingOnBlue
 
 from guided_lgp.errors import InputError
-from guided_lgp.experiments import studies
+from guided_lgp.experiments import feasibility, studies
 from guided_lgp.experiments.enumerate_sequences import shortest_table, verdict_table
 from guided_lgp.experiments.files import write_table
 from guided_lgp.logic import one_goal_objectives, satisfied, two_goal_objectives
@@ -66,6 +67,7 @@ STUDY: dict[str, Any] = {
         "spread": {"title": "Spread", "cases": ["paper", "relational"]},
         "floor": {"title": "Floor", "cases": ["paper", "shuffled"]},
     },
+    "feasibility": {"seed": 0, "validation_share": 0.5, "patience": 5, "network": NETWORK},
 }
 
 
@@ -99,6 +101,12 @@ def enumerate_all(root: Path, split: str, count: int) -> None:
         write_table(root / f"data/sequences/{split}{suffix}.parquet", pa.concat_tables(parts))
 
 
+def copy_models(root: Path) -> None:
+    """The trained networks; the paper's ones stand for the improved ones."""
+    for folder in ("models", "models/improved"):
+        shutil.copytree(ROOT / "models", root / folder, dirs_exist_ok=True)
+
+
 def test_train_evaluate_render(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(studies, "SceneBounds", NothingOnBlue)
     enumerate_all(root, "training", 2)
@@ -126,10 +134,13 @@ def test_train_evaluate_render(root: Path, monkeypatch: pytest.MonkeyPatch) -> N
     assert floor["paper"] == spread["paper"]
     assert list(floor) == ["paper", "shuffled"]
 
+    copy_models(root)
+    feasibility.run(root)
     render(root)
     page = (root / "reports/studies/studies.md").read_text()
     assert "**Spread**" in page
     assert "**Floor**" in page
+    assert "**A feasibility classifier: what it saves**" in page
     table = pd.read_csv(root / "reports/studies/tables/spread.csv")
     row = table.query(
         "case == 'paper' and planner == 'adaptation' and objectives == 'all' "
@@ -187,5 +198,8 @@ def test_the_declared_studies() -> None:
                 other.dropout,
             )
     stages = yaml.safe_load((ROOT / "studies/dvc.yaml").read_text())["stages"]
+    figures = {name for out in stages["feasibility"]["outs"] for name in out}
+    assert figures == {f"reports/studies/feasibility{part}.json" for part in ("", "_timing")}
+    assert figures < set(stages["render"]["deps"])
     outs = {name for out in stages["evaluate"]["outs"] for name in out}
     assert outs == {f"reports/studies/{table}.json" for table in study.tables}

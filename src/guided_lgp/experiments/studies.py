@@ -22,6 +22,7 @@ from guided_lgp.documents import write_json
 from guided_lgp.errors import InputError
 from guided_lgp.experiments.files import read_table
 from guided_lgp.logic import (
+    Objective,
     Skeleton,
     format_objective,
     one_goal_objectives,
@@ -32,6 +33,8 @@ from guided_lgp.nlp.bounds import SceneBounds
 from guided_lgp.nlp.results import CoarseResult, PathResult
 from guided_lgp.params import (
     BoundsParams,
+    Count,
+    Network,
     Params,
     SearchLimits,
     Section,
@@ -100,6 +103,16 @@ class Training(Section):
     relational: TrainRelational
 
 
+class FeasibilityStudy(Section):
+    """Training of the feasibility classifier."""
+
+    seed: Seed
+    validation_share: Annotated[float, Field(gt=0, lt=1)]
+    """Share of the configurations that stop the training and calibrate it."""
+    patience: Count
+    network: Network
+
+
 class StudyTable(Section):
     """One study: its cases, in order."""
 
@@ -115,6 +128,7 @@ class StudyParams(Section):
     training: Training
     cases: dict[str, Case]
     tables: dict[str, StudyTable]
+    feasibility: FeasibilityStudy
 
 
 def load_study(root: Path) -> tuple[StudyParams, Params]:
@@ -247,13 +261,7 @@ def evaluate(root: Path) -> None:
     """
     study, params = load_study(root)
     scenes = load_scenes(root / SCENES / "test.json").scenes
-    path = root / SEQUENCES / "test_shortest.parquet"
-    lengths: dict[str, dict[str, int | None]] = {}
-    for row in read_table(path, "enumerate_sequences", ["configuration", "objective", "length"]):
-        lengths.setdefault(row["configuration"], {})[row["objective"]] = row["length"]
-    for scene in scenes:
-        if scene.name not in lengths:
-            raise InputError(str(path), f"lacks {scene.name}", "the sequences of the same scenes")
+    lengths = shortest_lengths(root, scenes)
     tasks = [
         _Evaluation(scene, lengths[scene.name], study, params.bounds, root) for scene in scenes
     ]
@@ -272,6 +280,22 @@ def evaluate(root: Path) -> None:
         write_json(root / RESULTS / f"{table}.json", figures)
 
 
+def shortest_lengths(root: Path, scenes: Sequence[Scene]) -> dict[str, dict[str, int | None]]:
+    """Shortest feasible length by test configuration and objective.
+
+    Raises:
+        InputError: the output of enumerate_sequences is missing or of other scenes.
+    """
+    path = root / SEQUENCES / "test_shortest.parquet"
+    lengths: dict[str, dict[str, int | None]] = {}
+    for row in read_table(path, "enumerate_sequences", ["configuration", "objective", "length"]):
+        lengths.setdefault(row["configuration"], {})[row["objective"]] = row["length"]
+    for scene in scenes:
+        if scene.name not in lengths:
+            raise InputError(str(path), f"lacks {scene.name}", "the sequences of the same scenes")
+    return lengths
+
+
 def _by_subset(runs: Sequence[Sequence[Row]]) -> dict[str, dict[str, list[float | int]]]:
     """All or unseen objectives, then figures as in Table I, each with one value per run."""
     subsets: dict[str, dict[str, list[float | int]]] = {}
@@ -288,18 +312,13 @@ def _by_subset(runs: Sequence[Sequence[Row]]) -> dict[str, dict[str, list[float 
 def _evaluate(task: _Evaluation) -> list[Row]:
     symbols = task.scene.symbols
     bounds = CoarseBounds(task.scene, task.bounds)
-    problems = [
-        objective
-        for objective in one_goal_objectives(symbols) + two_goal_objectives(symbols)
-        if not satisfied(task.scene.state, objective)
-    ]
     rows = []
     for name, seed, planner in _runs(task.study):
         case = task.study.cases[name]
         kind = "relational" if case.policy == "relational" else "paper"  # the kind of files
         policy = load_policy(task.root / POLICIES / name / str(seed), kind)
         seen = set(training_objectives(symbols, case.objectives, seed))
-        for objective in problems:
+        for objective in problems(task.scene):
             result = PLANNERS[planner](
                 task.scene, objective, symbols, bounds, policy, task.study.limits
             )
@@ -307,7 +326,7 @@ def _evaluate(task: _Evaluation) -> list[Row]:
                 {
                     "run": (name, seed, planner),
                     "unseen": objective not in seen,
-                    "outcome": _outcome(result, task.shortest[format_objective(objective)]),
+                    "outcome": outcome(result, task.shortest[format_objective(objective)]),
                 }
             )
     return rows
@@ -320,7 +339,14 @@ def _runs(study: StudyParams) -> Iterator[tuple[str, int, str]]:
                 yield name, seed, planner
 
 
-def _outcome(result: SearchResult, shortest: int | None) -> str:
+def problems(scene: Scene) -> list[Objective]:
+    """The objectives of the generalization test that do not hold at the start."""
+    objectives = one_goal_objectives(scene.symbols) + two_goal_objectives(scene.symbols)
+    return [objective for objective in objectives if not satisfied(scene.state, objective)]
+
+
+def outcome(result: SearchResult, shortest: int | None) -> str:
+    """One of :data:`OUTCOMES`, given the shortest feasible length."""
     if result.skeleton is None:
         return "no_solution"
     return "shortest" if len(result.skeleton) == shortest else "feasible"

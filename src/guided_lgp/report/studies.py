@@ -9,6 +9,7 @@ from typing import Any
 
 from guided_lgp.documents import read_json, written_whole
 from guided_lgp.experiments.studies import OUTCOMES, RESULTS, StudyParams, StudyTable, load_study
+from guided_lgp.report.feasibility import feasibility_tables
 from guided_lgp.report.table import Record, Table
 
 PLANNERS = {"default": "default", "adaptation": "adaptation", "best_first": "best-first"}
@@ -30,17 +31,19 @@ def render(root: Path) -> None:
     study, _ = load_study(root)
     folder = root / RESULTS / "tables"
     shutil.rmtree(folder, ignore_errors=True)
-    sections = []
+    tables = {}
     for name, content in study.tables.items():
         figures = read_json(
             root / RESULTS / f"{name}.json", "the output of studies/run.py evaluate"
         )
-        table = _table(name, content, figures, study)
+        tables[name] = _table(name, content, figures, study)
+    tables |= feasibility_tables(root)
+    for name, table in tables.items():
         for suffix, text in (("tex", table.latex()), ("csv", table.csv())):
             with written_whole(folder / f"{name}.{suffix}") as file:
                 file.write_text(text, encoding="utf-8")
-        sections.append(table.markdown())
     with written_whole(root / RESULTS / "studies.md") as file:
+        sections = [table.markdown() for table in tables.values()]
         file.write_text("\n".join(["# Studies", "", *sections]), encoding="utf-8")
     logger.info("studies: %s", root / RESULTS / "studies.md")
 

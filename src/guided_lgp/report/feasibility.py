@@ -1,0 +1,137 @@
+"""The tables of the study of the feasibility classifier."""
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from guided_lgp.documents import read_json
+from guided_lgp.experiments.feasibility import CLASSIFIER
+from guided_lgp.experiments.studies import RESULTS
+from guided_lgp.report.table import Table
+
+SEARCHES = {"adaptation": "greedy", "best_first": "best-first"}
+
+Figures = Mapping[str, float]
+Runs = Mapping[str, Mapping[str, Mapping[str, Figures]]]
+"""Policy, search, without or with the classifier, figure."""
+
+
+def feasibility_tables(root: Path) -> dict[str, Table]:
+    """By file name: what the classifier saves, and how far its probabilities can be trusted.
+
+    Raises:
+        InputError: an output of the stage feasibility is missing.
+    """
+    origin = "the output of studies/run.py feasibility"
+    figures = read_json(root / RESULTS / "feasibility.json", origin)
+    times = read_json(root / RESULTS / "feasibility_timing.json", origin)
+    return {
+        "feasibility": _savings(figures["search"], times),
+        "feasibility_reliability": _reliability(figures["classifier"]),
+    }
+
+
+def verdict(times: Runs) -> str:
+    """Whether the classifier pays, in one sentence."""
+    changes = {policy: _change(searches.values()) for policy, searches in times.items()}
+    paying = [policy for policy, change in changes.items() if change < 0]
+    pays = {0: "does not pay", len(changes): "pays with every policy"}.get(
+        len(paying), f"pays with {' and '.join(paying)} only"
+    )
+    changed = ", ".join(f"{100 * change:+.1f} % ({policy})" for policy, change in changes.items())
+    infeasible = ", ".join(
+        f"{100 * _infeasible_share(run['without'] for run in searches.values()):.1f} % ({policy})"
+        for policy, searches in times.items()
+    )
+    return (
+        f"The classifier {pays}: it changes the time of coarse NLPs and policy, over both "
+        f"searches, by {changed}; infeasible NLPs, which a perfect one would not ask for, take "
+        f"{infeasible} of the time of the coarse NLPs."
+    )
+
+
+def _change(searches: Iterable[Mapping[str, Figures]]) -> float:
+    """By which share the classifier changes the time of coarse NLPs and policy."""
+    runs = list(searches)
+    without, with_it = (
+        sum(run[classified]["coarse_s"] + run[classified]["policy_s"] for run in runs)
+        for classified in CLASSIFIER
+    )
+    return with_it / without - 1
+
+
+def _infeasible_share(runs: Iterable[Figures]) -> float:
+    pairs = [(run["infeasible_s"], run["coarse_s"]) for run in runs]
+    return sum(infeasible for infeasible, _ in pairs) / sum(coarse for _, coarse in pairs)
+
+
+def _savings(search: Runs, times: Runs) -> Table:
+    runs = [
+        (policy, name, classified)
+        for policy in search
+        for name in SEARCHES
+        for classified in CLASSIFIER
+    ]
+    rows, records = [], []
+    for policy, name, classified in runs:
+        own, time = search[policy][name][classified], times[policy][name][classified]
+        rows.append(
+            (
+                policy,
+                SEARCHES[name],
+                classified,
+                f"{100 * own['shortest']:.1f}",
+                f"{100 * own['no_solution']:.1f}",
+                str(own["coarse_calls"]),
+                str(own["infeasible_calls"]),
+                f"{time['coarse_s']:.1f}",
+                f"{100 * _infeasible_share([time]):.1f}",
+                f"{time['policy_s']:.1f}",
+            )
+        )
+        run = {"policy": policy, "search": name, "classifier": classified}
+        records.append(run | dict(own) | dict(time))
+    return Table(
+        name="study_feasibility",
+        title="A feasibility classifier: what it saves",
+        columns=(
+            *("policy", "search", "classifier", "shortest, %", "no plan, %"),
+            *("coarse NLPs", "infeasible", "coarse time, s", "of it infeasible, %"),
+            "policy time, s",
+        ),
+        labels=3,
+        rows=tuple(rows),
+        notes=(
+            verdict(times),
+            "The classifier predicts from state and action whether the coarse NLP will be "
+            "feasible, and adds log p(feasible) to the policy's log p: it orders the actions and "
+            "excludes none. Sums over all problems of the generalization test, up to the coarse "
+            "bound; the time of the policy includes the classifier's.",
+        ),
+        records=records,
+    )
+
+
+def _reliability(quality: Mapping[str, Any]) -> Table:
+    (caught, missed), (alarms, _) = quality["confusion"]
+    return Table(
+        name="study_feasibility_reliability",
+        title="A feasibility classifier: predicted and observed shares of feasible sequences",
+        columns=("predicted from", "sequences", "predicted, %", "feasible, %"),
+        rows=tuple(
+            (
+                f"{row['from']:.1f}",
+                str(row["n"]),
+                f"{100 * row['predicted']:.1f}",
+                f"{100 * row['feasible']:.1f}",
+            )
+            for row in quality["bins"]
+        ),
+        notes=(
+            f"Over the enumerated sequences of the test configurations ({quality['n']}): Brier "
+            f"score {quality['brier']:.4f}, that of the share of the feasible "
+            f"{quality['brier_base']:.4f}; expected calibration error {quality['ece']:.4f}. At 0.5 "
+            f"it recognises {caught} of {caught + missed} infeasible ones, with {alarms} false "
+            "alarms.",
+        ),
+    )
