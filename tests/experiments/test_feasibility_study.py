@@ -106,8 +106,8 @@ def test_a_complete_search_stays_complete(outputs: Path) -> None:
     ("policy_s", "words"),
     [
         ((0.5, 0.5), "does not pay"),
-        ((0.1, 0.5), "pays with one only"),
-        ((0.1, 0.1), "pays with every policy"),
+        ((0.1, 0.5), "pays for 1 of 2 policies (one)"),
+        ((0.1, 0.1), "pays for every policy"),
     ],
 )
 def test_the_verdict_counts_all_that_takes_time(policy_s: tuple[float, float], words: str) -> None:

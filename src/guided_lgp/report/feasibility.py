@@ -35,8 +35,8 @@ def verdict(times: Runs) -> str:
     """Whether the classifier pays, in one sentence."""
     changes = {policy: _change(searches.values()) for policy, searches in times.items()}
     paying = [policy for policy, change in changes.items() if change < 0]
-    pays = {0: "does not pay", len(changes): "pays with every policy"}.get(
-        len(paying), f"pays with {' and '.join(paying)} only"
+    pays = {0: "does not pay", len(changes): "pays for every policy"}.get(
+        len(paying), f"pays for {len(paying)} of {len(changes)} policies ({', '.join(paying)})"
     )
     changed = ", ".join(f"{100 * change:+.1f} % ({policy})" for policy, change in changes.items())
     infeasible = ", ".join(
