@@ -36,6 +36,9 @@ FEATURES = (
 """Inputs. The target is what the gripper reaches for: the box of a grasp, the support of a place;
 positions in m. No input names a symbol, and their number is the same for any number of boxes."""
 
+BINS = 10
+"""Of equal width between the probabilities 0 and 1."""
+
 _TEMPERATURES = (0.1, 10.0)
 _LEAST_DEVIATION = 1e-3  # less is no information, and scaling it up would be noise
 
@@ -190,24 +193,23 @@ def calibrated(classifier: FeasibilityClassifier, verdicts: Verdicts) -> Feasibi
     return at(float(np.exp(best.x)))
 
 
-def calibration(p: FloatArray, feasible: NDArray[np.int64], bins: int = 10) -> dict[str, object]:
+def calibration(p: FloatArray, feasible: NDArray[np.int64]) -> dict[str, object]:
     """How far predicted probabilities can be trusted.
 
     Args:
         p: (n,) predicted probabilities of being feasible.
         feasible: (n,) 1 where the sequence is feasible, else 0.
-        bins: of equal width between 0 and 1.
 
     Returns:
         ``brier``: mean squared error of the probabilities, and ``brier_base`` that of the share of
         the feasible; ``ece``: expected calibration error, the mean distance between predicted and
-        observed share over the bins; ``confusion``: rows infeasible and feasible in truth, columns
+        observed share over :data:`BINS`; ``confusion``: rows infeasible and feasible in truth, columns
         as predicted at 0.5; ``bins``: those that are not empty.
     """
-    bin_of = np.minimum((p * bins).astype(int), bins - 1)
+    bin_of = np.minimum((p * BINS).astype(int), BINS - 1)
     shares = [
         {
-            "from": index / bins,
+            "from": index / BINS,
             "n": int((bin_of == index).sum()),
             "predicted": float(p[bin_of == index].mean()),
             "feasible": float(feasible[bin_of == index].mean()),
