@@ -203,7 +203,7 @@ def calibration(p: FloatArray, feasible: NDArray[np.int64]) -> dict[str, object]
     Returns:
         ``brier``: mean squared error of the probabilities, and ``brier_base`` that of the share of
         the feasible; ``ece``: expected calibration error, the mean distance between predicted and
-        observed share over :data:`BINS`; ``confusion``: rows infeasible and feasible in truth, columns
+        observed share over the bins; ``confusion``: rows infeasible and feasible in truth, columns
         as predicted at 0.5; ``bins``: those that are not empty.
     """
     bin_of = np.minimum((p * BINS).astype(int), BINS - 1)
