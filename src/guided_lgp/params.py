@@ -53,6 +53,7 @@ class GenerateScenes(Section):
     training_configurations: Annotated[int, Field(strict=True, ge=1, le=1_000_000)]
     test_configurations: Annotated[int, Field(strict=True, ge=1, le=1_000_000)]
     scalability_configurations: Annotated[int, Field(strict=True, ge=1, le=1000)]
+    many_boxes_configurations: Annotated[int, Field(strict=True, ge=1, le=1000)]
     seed_training: Seed
     seed_test: Seed
     seed_scalability: Seed
@@ -137,12 +138,16 @@ class TrainRelational(Section):
 
 
 class SearchLimits(Section):
-    """Limits of a search: depth and reattempts of the guided one, nodes and paths of any."""
+    """Limits of a search: depth and reattempts of the guided one, nodes and sequences of any."""
 
     max_depth: Annotated[int, Field(strict=True, ge=1, le=100)]
     reattempts: Annotated[int, Field(strict=True, ge=0, le=1000)]
     max_tree_size: Count
     max_paths: Annotated[int, Field(strict=True, ge=1, le=10_000)]
+    """Sequences handed to the path bound."""
+    max_sequences: Annotated[int, Field(strict=True, ge=1, le=1_000_000)]
+    """Sequences handed to the coarse bound: minutes at 20 actions, where a search could otherwise
+    take a day."""
 
 
 class Params(Section):

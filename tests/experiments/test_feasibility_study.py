@@ -90,7 +90,9 @@ def test_a_complete_search_stays_complete(outputs: Path) -> None:
     """Without a plan to find, everything feasible is visited, with the classifier as without."""
     classifier = train_classifier(verdicts(outputs, "training"), NETWORK, 0.5, 20, 0)
     scene = load_scenes(outputs / "data/scenes/test.json").scenes[0]
-    limits = SearchLimits(max_depth=3, reattempts=0, max_tree_size=1000, max_paths=1)
+    limits = SearchLimits(
+        max_depth=3, reattempts=0, max_tree_size=1000, max_paths=1, max_sequences=1000
+    )
     bounds = studies.CoarseBounds(scene, load_params(outputs / "params.yaml").bounds)
     trees = []
     for policy in (Uniform(), FeasibilityAware(Uniform(), classifier)):

@@ -51,7 +51,13 @@ RELATIONAL = {
 SMALL = {"policy": "paper", "seeds": 1, "configurations": 2, "objectives": 40}
 STUDY: dict[str, Any] = {
     "seeds": [4, 11],
-    "limits": {"max_depth": 3, "reattempts": 0, "max_tree_size": 40, "max_paths": 2},
+    "limits": {
+        "max_depth": 3,
+        "reattempts": 0,
+        "max_tree_size": 40,
+        "max_paths": 2,
+        "max_sequences": 1000,
+    },
     "training": {"paper": NETWORKS, "improved": NETWORKS, "relational": RELATIONAL},
     "cases": {
         "paper": {**SMALL, "title": "paper", "seeds": 2},

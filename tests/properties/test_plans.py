@@ -29,7 +29,9 @@ from guided_lgp.search.result import SearchResult
 @pytest.fixture(scope="module")
 def params() -> Params:
     """Limits that end a search within about a second."""
-    limits = SearchLimits(max_depth=4, reattempts=1, max_tree_size=120, max_paths=2)
+    limits = SearchLimits(
+        max_depth=4, reattempts=1, max_tree_size=120, max_paths=2, max_sequences=1000
+    )
     return load_params(Path(__file__).parents[2] / "params.yaml").model_copy(
         update={
             "bounds": BoundsParams(coarse_tries=3, path_solutions=1),

@@ -22,4 +22,6 @@ def tray_scene() -> Scene:
 @pytest.fixture
 def limits() -> SearchLimits:
     """Those of the generalization experiment."""
-    return SearchLimits(max_depth=8, reattempts=3, max_tree_size=20_000, max_paths=1000)
+    return SearchLimits(
+        max_depth=8, reattempts=3, max_tree_size=20_000, max_paths=1000, max_sequences=1000
+    )

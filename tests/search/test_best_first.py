@@ -6,7 +6,6 @@ from guided_lgp.logic import Skeleton, parse_objective, parse_skeleton, progress
 from guided_lgp.params import SearchLimits
 from guided_lgp.scene.model import Scene
 from guided_lgp.search import best_first, breadth_first
-from guided_lgp.search.result import MAX_COARSE
 
 TOWER = parse_objective(["(on red green)", "(on green blue)"])
 
@@ -16,7 +15,9 @@ def left_hand_fails(skeleton: Skeleton) -> bool:
 
 
 def test_a_uniform_policy_solves_four_actions(scene: Scene) -> None:
-    limits = SearchLimits(max_depth=4, reattempts=0, max_tree_size=20_000, max_paths=1000)
+    limits = SearchLimits(
+        max_depth=4, reattempts=0, max_tree_size=20_000, max_paths=1000, max_sequences=1000
+    )
     bounds = ScriptedBounds(scene)
     result = best_first.plan(scene, TOWER, scene.symbols, bounds, UNIFORM, limits)
     assert result.skeleton is not None
@@ -73,7 +74,9 @@ def test_same_search_twice(scene: Scene, limits: SearchLimits) -> None:
 def test_a_policy_that_goes_in_circles(scene: Scene) -> None:
     """It loves to move green to and fro; the search still turns to red soon."""
     circles = Scorer(lambda objective, state, action: 6.0 * (action.box == "green"))
-    limits = SearchLimits(max_depth=20, reattempts=0, max_tree_size=400_000, max_paths=1000)
+    limits = SearchLimits(
+        max_depth=20, reattempts=0, max_tree_size=400_000, max_paths=1000, max_sequences=1000
+    )
     result = best_first.plan(
         scene,
         parse_objective(["(on red tab2)"]),
@@ -129,7 +132,7 @@ def test_ends_after_so_many_sequences_without_a_path(scene: Scene, limits: Searc
 
 def test_ends_after_so_many_coarse_bounds(scene: Scene, limits: SearchLimits) -> None:
     bounds = ScriptedBounds(scene, coarse=lambda skeleton: len(skeleton) < 4)
-    limits = limits.model_copy(update={"max_tree_size": 400_000})
+    limits = limits.model_copy(update={"max_sequences": 70})
     result = best_first.plan(scene, TOWER, scene.symbols, bounds, UNIFORM, limits)
-    assert (result.reason, result.coarse_calls) == ("coarse", MAX_COARSE)
+    assert (result.reason, result.coarse_calls) == ("coarse", 70)
     assert "limit of sequences for the coarse bound" in result.explanation

@@ -9,7 +9,9 @@ from guided_lgp.params import SearchLimits
 from guided_lgp.scene.model import Scene
 from guided_lgp.search import breadth_first
 
-LIMITS = SearchLimits(max_depth=20, reattempts=3, max_tree_size=400_000, max_paths=1000)
+LIMITS = SearchLimits(
+    max_depth=20, reattempts=3, max_tree_size=400_000, max_paths=1000, max_sequences=1000
+)
 TOWER = parse_objective(["(on red green)", "(on green blue)"])
 
 
@@ -45,7 +47,9 @@ def test_tower_is_found_in_the_fourth_level(scene: Scene) -> None:
 
 def test_stops_at_the_limit_and_says_why(scene: Scene) -> None:
     bounds = ScriptedBounds(scene, coarse=lambda skeleton: False)
-    limits = SearchLimits(max_depth=20, reattempts=3, max_tree_size=2_000, max_paths=1000)
+    limits = SearchLimits(
+        max_depth=20, reattempts=3, max_tree_size=2_000, max_paths=1000, max_sequences=1000
+    )
     result = breadth_first.plan(scene, TOWER, scene.symbols, bounds, limits)
     assert not result.solved
     assert result.reason == "stopped"

@@ -67,7 +67,9 @@ def test_reattempt_after_an_infeasible_path(scene: Scene, limits: SearchLimits) 
 
 def test_maximum_depth_ends_attempts(scene: Scene) -> None:
     never = Scorer(lambda objective, state, action: -9.0 * (action.box == "red"))
-    limits = SearchLimits(max_depth=3, reattempts=2, max_tree_size=20_000, max_paths=1000)
+    limits = SearchLimits(
+        max_depth=3, reattempts=2, max_tree_size=20_000, max_paths=1000, max_sequences=1000
+    )
     bounds = ScriptedBounds(scene)
     result = guided.plan(
         scene, parse_objective(["(held red)"]), scene.symbols, bounds, never, limits
@@ -81,7 +83,9 @@ def test_maximum_depth_ends_attempts(scene: Scene) -> None:
 
 def test_failed_nodes_are_never_tried_again(scene: Scene) -> None:
     bounds = ScriptedBounds(scene, coarse=lambda skeleton: False)
-    limits = SearchLimits(max_depth=8, reattempts=100, max_tree_size=20_000, max_paths=1000)
+    limits = SearchLimits(
+        max_depth=8, reattempts=100, max_tree_size=20_000, max_paths=1000, max_sequences=1000
+    )
     result = guided.plan(scene, TOWER, scene.symbols, bounds, UNIFORM, limits)
     assert result.reason == "exhausted"
     assert result.tree_size == 7
@@ -122,7 +126,9 @@ def test_a_reattempt_leaves_the_circle(scene: Scene) -> None:
             {"green": 6.0, "red": 3.0}.get(action.box, 0.0) + 2.0 * (action.table == "tab2")
         )
     )
-    limits = SearchLimits(max_depth=8, reattempts=1, max_tree_size=20_000, max_paths=1000)
+    limits = SearchLimits(
+        max_depth=8, reattempts=1, max_tree_size=20_000, max_paths=1000, max_sequences=1000
+    )
     objective = parse_objective(["(on red tab2)"])
     result = guided.plan(scene, objective, scene.symbols, ScriptedBounds(scene), circles, limits)
     assert result.causes == ("max_depth",)

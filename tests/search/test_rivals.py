@@ -22,7 +22,9 @@ from guided_lgp.search.landmark_cut import LandmarkCut
 from guided_lgp.search.result import SearchResult
 from guided_lgp.search.tree import StateSpace, distances
 
-LIMITS = SearchLimits(max_depth=12, reattempts=0, max_tree_size=400_000, max_paths=1000)
+LIMITS = SearchLimits(
+    max_depth=12, reattempts=0, max_tree_size=400_000, max_paths=1000, max_sequences=1000
+)
 TOWER = parse_objective(["(on red green)", "(on green blue)"])
 RIVALS = [graph.plan, classical.plan]
 Planner = Callable[..., SearchResult]

@@ -8,6 +8,8 @@ from guided_lgp.paths import SCENES
 from guided_lgp.scene import generate
 from guided_lgp.scene.setups import SETUPS
 
+_BOXES_OF_THE_PAPER = 5
+
 logger = logging.getLogger(__name__)
 
 
@@ -18,8 +20,10 @@ def run(params: Params, root: Path) -> None:
         ("training", "a", settings.training_configurations, settings.seed_training),
         ("test", "a", settings.test_configurations, settings.seed_test),
     ]
-    count, seed = settings.scalability_configurations, settings.seed_scalability
-    wanted += [(f"scalability_{setup}", setup, count, seed) for setup in SETUPS]
+    for setup, content in SETUPS.items():
+        many = len(content.boxes) > _BOXES_OF_THE_PAPER
+        count = settings.many_boxes_configurations if many else settings.scalability_configurations
+        wanted.append((f"scalability_{setup}", setup, count, settings.seed_scalability))
     for name, setup, number, stream in wanted:
         scenes = generate(setup, number, stream, name.replace("_", "-"))
         scenes.save(root / SCENES / f"{name}.json")

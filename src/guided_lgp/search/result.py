@@ -14,10 +14,6 @@ from guided_lgp.search.policy import Policy
 Cause = Literal["infeasible", "max_depth"]
 """Why an attempt of the guided search ended (paper, Table I)."""
 
-MAX_COARSE = 1000
-"""Sequences that one search hands to the coarse bound: more than 20 times what any of the paper's
-problems needs, and minutes at 20 actions, where a search could otherwise take a day."""
-
 Reason = Literal["stopped", "coarse", "paths", "exhausted", "attempts"]
 """Why a search ended without a plan: limit of nodes or of either bound, nothing left to expand, or
 no reattempt left."""
@@ -172,7 +168,7 @@ class Run:
         """The limit that ends the search, if one is reached."""
         if self._path_calls >= limits.max_paths:
             return "paths"
-        if len(self._asked) >= MAX_COARSE:
+        if len(self._asked) >= limits.max_sequences:
             return "coarse"
         return "stopped" if tree_size >= limits.max_tree_size else None
 
