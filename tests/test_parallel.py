@@ -190,16 +190,16 @@ def test_workers_end_with_the_process_that_started_them(
     parent, below = start(tmp_path, FAN_OUT.format(folder=str(tmp_path), backend=backend))
     assert {int(file.name) for file in tmp_path.iterdir()} <= {process.pid for process in below}
     parent.send_signal(number)
-    assert parent.wait(20) != 0
-    wait_until(lambda: all(map(gone, below)), 10)
+    assert parent.wait(60) != 0
+    wait_until(lambda: all(map(gone, below)), 60)
 
 
 def test_a_stage_and_its_workers_end_with_the_process_that_runs_stages(tmp_path: Path) -> None:
     stage = STAGE + FAN_OUT.format(folder=str(tmp_path), backend="loky")
     runner, below = start(tmp_path, STARTER, stage)
     runner.kill()
-    runner.wait(5)
-    wait_until(lambda: all(map(gone, below)), 10)
+    runner.wait(60)
+    wait_until(lambda: all(map(gone, below)), 60)
 
 
 def test_progress_in_a_pipe_is_a_line_per_milestone(caplog: pytest.LogCaptureFixture) -> None:
