@@ -22,8 +22,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
 
-import yaml
-
 from guided_lgp.errors import InputError
 from guided_lgp.params import Params
 from guided_lgp.paths import PARAMS
@@ -150,10 +148,12 @@ def sync(params: Params) -> tuple[list[str], list[str]]:
     Raises:
         InputError: there is no ``dvc.lock``, or an output or a parameter is not the one in it.
     """
+    from dvc.utils.serialize import load_yaml  # YAML 1.2, where 1e-05 is a number
+
     lock = Path("dvc.lock")
     if not lock.is_file():
         raise InputError("dvc.lock", "not found: no stage has run here", "dvc repro first")
-    document = yaml.safe_load(lock.read_text(encoding="utf-8"))
+    document = load_yaml(lock)
     stages = [StageFiles.of(address, entry) for address, entry in document["stages"].items()]
     known = _recorded_keys(prepare())
     missing = [stage for stage in stages if stage.key not in known]
