@@ -1,4 +1,4 @@
-"""The stages of studies/dvc.yaml: train CASE, evaluate, feasibility, render."""
+"""The stages of studies/dvc.yaml: train CASE, evaluate TABLE, feasibility, render."""
 
 import logging
 import sys
@@ -13,15 +13,15 @@ try:
     match sys.argv[1:]:
         case ["train", case]:
             studies.train(Path.cwd(), case)
-        case ["evaluate"]:
-            studies.evaluate(Path.cwd())
+        case ["evaluate", table]:
+            studies.evaluate(Path.cwd(), table)
         case ["feasibility"]:
             feasibility.run(Path.cwd())
         case ["render"]:
             render(Path.cwd())
         case words:
             raise InputError(
-                " ".join(words), "is no stage", "train CASE, evaluate, feasibility, render"
+                " ".join(words), "is no stage", "train CASE, evaluate TABLE, feasibility, render"
             )
 except InputError as error:
     print(f"error: {error}", file=sys.stderr)

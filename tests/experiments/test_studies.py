@@ -119,7 +119,8 @@ def test_train_evaluate_render(root: Path, monkeypatch: pytest.MonkeyPatch) -> N
     enumerate_all(root, "test", 1)
     for case in STUDY["cases"]:
         studies.train(root, case)
-    studies.evaluate(root)
+    for table in STUDY["tables"]:
+        studies.evaluate(root, table)
     spread = json.loads((root / "reports/studies/spread.json").read_text())
     assert list(spread) == ["paper", "relational"]
     for case, planners in spread.items():
@@ -178,6 +179,8 @@ def test_bad_parameters(root: Path, change: dict[str, Any], fault: str) -> None:
 def test_unknown_cases_are_refused(root: Path) -> None:
     with pytest.raises(InputError, match=r"case 'none': is unknown .*paper, relational"):
         studies.train(root, "none")
+    with pytest.raises(InputError, match=r"table 'none': is unknown .*spread"):
+        studies.evaluate(root, "none")
 
 
 def test_the_declared_studies() -> None:
@@ -207,5 +210,6 @@ def test_the_declared_studies() -> None:
     figures = {name for out in stages["feasibility"]["outs"] for name in out}
     assert figures == {f"reports/studies/feasibility{part}.json" for part in ("", "_timing")}
     assert figures < set(stages["render"]["deps"])
-    outs = {name for out in stages["evaluate"]["outs"] for name in out}
-    assert outs == {f"reports/studies/{table}.json" for table in study.tables}
+    assert {"spread", *stages["evaluate"]["foreach"]} == set(study.tables)
+    inputs = {dep for dep in stages["spread"]["deps"] if dep.startswith("data/studies")}
+    assert inputs == {f"data/studies/{case}" for case in study.tables["spread"].cases}

@@ -249,35 +249,39 @@ class _Evaluation:
     shortest: Mapping[str, int | None]
     """Shortest feasible length by objective."""
     study: StudyParams
+    table: str
     bounds: BoundsParams
     root: Path
 
 
-def evaluate(root: Path) -> None:
-    """Write ``reports/studies/<study>.json``: figures of each case, planner, seed and subset.
+def evaluate(root: Path, table: str) -> None:
+    """Write ``reports/studies/<table>.json``: figures of each case, planner, seed and subset.
 
     Raises:
-        InputError: bad parameters, or an output of the pipeline or of the training is missing.
+        InputError: bad parameters, an unknown table, or an output of the pipeline or of the
+            training is missing.
     """
     study, params = load_study(root)
+    if table not in study.tables:
+        raise InputError(f"table {table!r}", "is unknown", ", ".join(study.tables))
     scenes = load_scenes(root / SCENES / "test.json").scenes
     lengths = shortest_lengths(root, scenes)
     tasks = [
-        _Evaluation(scene, lengths[scene.name], study, params.bounds, root) for scene in scenes
+        _Evaluation(scene, lengths[scene.name], study, table, params.bounds, root)
+        for scene in scenes
     ]
     parts = parallel.run(_evaluate, tasks, params.parallel, "studies")
-    rows: dict[tuple[str, int, str], list[Row]] = {run: [] for run in _runs(study)}
+    rows: dict[tuple[str, int, str], list[Row]] = {run: [] for run in _runs(study, table)}
     for row in (row for part in parts for row in part):
         rows[row["run"]].append(row)
-    for table, content in study.tables.items():
-        figures = {
-            name: {
-                planner: _by_subset([rows[run] for run in rows if run[::2] == (name, planner)])
-                for planner in PLANNERS
-            }
-            for name in content.cases
+    figures = {
+        name: {
+            planner: _by_subset([rows[run] for run in rows if run[::2] == (name, planner)])
+            for planner in PLANNERS
         }
-        write_json(root / RESULTS / f"{table}.json", figures)
+        for name in study.tables[table].cases
+    }
+    write_json(root / RESULTS / f"{table}.json", figures)
 
 
 def shortest_lengths(root: Path, scenes: Sequence[Scene]) -> dict[str, dict[str, int | None]]:
@@ -313,7 +317,7 @@ def _evaluate(task: _Evaluation) -> list[Row]:
     symbols = task.scene.symbols
     bounds = CoarseBounds(task.scene, task.bounds)
     rows = []
-    for name, seed, planner in _runs(task.study):
+    for name, seed, planner in _runs(task.study, task.table):
         case = task.study.cases[name]
         kind = "relational" if case.policy == "relational" else "paper"  # the kind of files
         policy = load_policy(task.root / POLICIES / name / str(seed), kind)
@@ -332,9 +336,9 @@ def _evaluate(task: _Evaluation) -> list[Row]:
     return rows
 
 
-def _runs(study: StudyParams) -> Iterator[tuple[str, int, str]]:
-    for name, case in study.cases.items():
-        for seed in study.seeds[: case.seeds]:
+def _runs(study: StudyParams, table: str) -> Iterator[tuple[str, int, str]]:
+    for name in study.tables[table].cases:
+        for seed in study.seeds[: study.cases[name].seeds]:
             for planner in PLANNERS:
                 yield name, seed, planner
 
