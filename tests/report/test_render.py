@@ -155,7 +155,7 @@ def test_rendering_again_gives_the_same_bytes_and_other_figures_are_optional(
     assert all(after[path] == content for path, content in before.items())
     page = (root / "reports/report.html").read_text(encoding="utf-8")
     assert "The two bounds of the NLP on random sequences" in page
-    assert '<a href="studies/studies.md">' in page
+    assert '<a href="../docs/studies.md">' in page
     rows = {row[0]: row[1:] for row in rows_of(root / "reports/tables/draws.md")}
     assert rows["Paper's networks"] == ["92.0% ± 2.0%"] * 6 + ["3"]
     assert rows["Relational policy"] == ["–"] * 2 + ["92.0% ± 2.0%"] * 2 + ["–"] * 2 + ["3"]

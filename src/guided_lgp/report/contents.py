@@ -73,8 +73,8 @@ def compose(
         ),
     ]
     if "draws" in tables:
-        more = "Ablations, data efficiency and the floor of shuffled labels"
-        generalization[2:2] = [tables["draws"], Links([("studies/studies.md", more)])]
+        more = "The studies: this spread, ablations, data efficiency, feasibility classifier"
+        generalization[2:2] = [tables["draws"], Links([("../docs/studies.md", more)])]
     scalability: list[Block] = [
         Picture(
             "headline.svg",
