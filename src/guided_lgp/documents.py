@@ -59,9 +59,21 @@ def write_json(path: Path, document: Any) -> None:
     Raises:
         InputError: the file cannot be written.
     """
-    text = json.dumps(document, indent=1, allow_nan=False)
+    write_text(path, json.dumps(document, indent=1, allow_nan=False) + "\n")
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text in UTF-8.
+
+    Args:
+        path: the file; its folder is made.
+        text: the whole content.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
     with written_whole(path) as unfinished:
-        unfinished.write_text(text + "\n", encoding="utf-8")
+        unfinished.write_text(text, encoding="utf-8")
 
 
 @contextmanager

@@ -160,6 +160,10 @@ def test_nested_too_deeply(tmp_path: Path) -> None:
         read_plan(file)
 
 
-def test_a_folder_that_does_not_exist(result: PathResult, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="No such file"):
-        write_plan(tmp_path / "no" / "plan.json", SCENE, OBJECTIVE, result, {})
+def test_a_full_disk_leaves_what_was_there(file: Path, result: PathResult) -> None:
+    before = file.read_bytes()
+    file.with_name(".unfinished-plan.json").symlink_to("/dev/full")
+    with pytest.raises(InputError, match="cannot be written: No space left on device"):
+        write_plan(file, SCENE, OBJECTIVE, result, {})
+    assert file.read_bytes() == before
+    assert [path.name for path in file.parent.iterdir()] == ["plan.json"]

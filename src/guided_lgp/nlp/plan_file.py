@@ -6,7 +6,6 @@ attachments and forward kinematics. Lengths in m, angles in rad, times in s.
 """
 
 import json
-import tempfile
 from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
@@ -15,7 +14,7 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from guided_lgp.documents import read_json
+from guided_lgp.documents import read_json, write_text
 from guided_lgp.errors import InputError
 from guided_lgp.logic import Action, Goal, Objective, Skeleton
 from guided_lgp.nlp.results import JOINT_NAMES, Attachment, Keyframe, PathResult, Trajectory
@@ -137,10 +136,10 @@ def write_plan(
     statistics: Mapping[str, object],
     physics: Mapping[str, object] | None = None,
 ) -> None:
-    """Write a plan, atomically.
+    """Write a plan.
 
     Args:
-        path: the file; its folder must exist.
+        path: the file; its folder is made.
         scene: the initial configuration.
         objective: the goals that the plan achieves.
         result: a feasible result of the path bound.
@@ -179,16 +178,7 @@ def write_plan(
         f"{json.dumps(key)}: {json.dumps(value, separators=(',', ':'), allow_nan=False)}"
         for key, value in document.items()
     )
-    try:
-        with tempfile.NamedTemporaryFile(
-            "w", encoding="utf-8", dir=path.parent, prefix=path.name, delete=False
-        ) as file:
-            file.write("{\n" + ",\n".join(lines) + "\n}\n")
-        written = Path(file.name)
-        written.chmod(0o644)
-        written.replace(path)
-    except OSError as error:
-        raise InputError(str(path), error.strerror or "cannot be written") from None
+    write_text(path, "{\n" + ",\n".join(lines) + "\n}\n")
 
 
 def read_plan(path: Path) -> Plan:

@@ -11,6 +11,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from guided_lgp.documents import written_whole
 from guided_lgp.experiments.problems import Problem
 from guided_lgp.report import paper
 from guided_lgp.report.inputs import Metrics, compared
@@ -64,10 +65,11 @@ OUTCOMES = {
 @mpl.rc_context(_STYLE)
 def save(figure: Figure, folder: Path, name: str) -> None:
     """Write ``name.png`` and ``name.svg``; the same figure gives the same bytes."""
-    folder.mkdir(parents=True, exist_ok=True)
-    figure.savefig(folder / f"{name}.png", metadata={"Software": None})
+    with written_whole(folder / f"{name}.png") as file:
+        figure.savefig(file, metadata={"Software": None})
     figure.set_layout_engine("none")  # keep the layout, which takes longer than drawing
-    figure.savefig(folder / f"{name}.svg", metadata={"Date": None, "Creator": None})
+    with written_whole(folder / f"{name}.svg") as file:
+        figure.savefig(file, metadata={"Date": None, "Creator": None})
 
 
 def _subplots(

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from guided_lgp.documents import write_text
 from guided_lgp.errors import InputError
 from guided_lgp.paths import REPORTS
 from guided_lgp.report.benchmarks import PAGE
@@ -39,7 +40,7 @@ def update_readme(root: Path) -> None:
     """Replace the results between the two markers of ``README.md`` by the current ones.
 
     Raises:
-        InputError: a table or a marker is missing.
+        InputError: a table or a marker is missing, or the file cannot be written.
     """
     path = root / "README.md"
     text = path.read_text(encoding="utf-8")
@@ -48,7 +49,7 @@ def update_readme(root: Path) -> None:
     if not end:
         raise InputError(str(path), "has no markers of the results", f"{BEGIN} and {END}")
     block = readme_block(root)
-    path.write_text(f"{before}{begin}\n\n{block}\n{end}{after}", encoding="utf-8")
+    write_text(path, f"{before}{begin}\n\n{block}\n{end}{after}")
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from guided_lgp.documents import write_json
+from guided_lgp.documents import write_json, write_text
 from guided_lgp.logic import parse_skeleton
 from guided_lgp.nlp.bounds import SceneBounds
 from guided_lgp.params import BoundsParams, Params
@@ -39,7 +39,8 @@ def run(params: Params, root: Path) -> None:
         root: the folder of ``dvc.yaml``.
 
     Raises:
-        InputError: an output of an earlier stage is missing; the message names the stage.
+        InputError: an output of an earlier stage is missing, and the message names the stage; or
+            a file cannot be written.
     """
     inputs = load_inputs(root)
     reports = root / REPORTS
@@ -57,9 +58,9 @@ def run(params: Params, root: Path) -> None:
             ("tex", table.latex()),
             ("csv", table.csv()),
         ):
-            (reports / "tables" / f"{table.name}.{suffix}").write_text(text, encoding="utf-8")
+            write_text(reports / "tables" / f"{table.name}.{suffix}", text)
     found = sentences(inputs, calls)
-    (reports / "tables" / "findings.md").write_text(found, encoding="utf-8")
+    write_text(reports / "tables" / "findings.md", found)
     for name, figure in _figures(inputs, params).items():
         figures.save(figure, reports / "figures", name)
     for setup in inputs.setups:
@@ -67,8 +68,8 @@ def run(params: Params, root: Path) -> None:
         draw_scene(scene, reports / "figures" / f"setup_{setup}.png")
     replays = _replays(inputs, params.bounds, reports)
     document = compose(inputs, params, novelty, calls, written, replays)
-    (reports / "report.md").write_text(document.markdown(), encoding="utf-8")
-    (reports / "report.html").write_text(document.html(reports), encoding="utf-8")
+    write_text(reports / "report.md", document.markdown())
+    write_text(reports / "report.html", document.html(reports))
     logger.info("report: %s", reports / "report.html")
 
 
@@ -108,7 +109,7 @@ def _write_curves(inputs: Inputs, folder: Path) -> None:
         file = "_".join((policy, *name.split(": "))) + ".csv"
         curves = pd.DataFrame(report["curves"])
         curves.insert(0, "epoch", range(1, len(curves) + 1))
-        curves.to_csv(folder / file, index=False)
+        write_text(folder / file, curves.to_csv(index=False))
 
 
 def _figures(inputs: Inputs, params: Params) -> Mapping[str, Figure]:

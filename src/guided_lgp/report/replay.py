@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from guided_lgp.documents import write_text
 from guided_lgp.nlp.results import Trajectory
 from guided_lgp.report.viewer import Viewer
 from guided_lgp.scene.model import Scene
@@ -25,6 +26,9 @@ def replay_html(trajectory: Trajectory, scene: Scene, path: Path) -> None:
         trajectory: the motion of a plan.
         scene: the scene it starts in.
         path: the HTML file to write; its folder is made.
+
+    Raises:
+        InputError: the file cannot be written.
     """
     with Viewer(scene) as viewer:
         # A serializer of viser records until it is asked for its page, once.
@@ -35,8 +39,7 @@ def replay_html(trajectory: Trajectory, scene: Scene, path: Path) -> None:
         recording.insert_sleep(_STILL_S)
         page = recording.as_html()
     title = f"<title>Replay: {html.escape(scene.name)}</title>"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(page.replace("<title>Viser</title>", title, 1), encoding="utf-8")
+    write_text(path, page.replace("<title>Viser</title>", title, 1))
 
 
 def play(viewer: Viewer, trajectory: Trajectory) -> Iterator[float]:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from guided_lgp.documents import read_json, written_whole
+from guided_lgp.documents import read_json, write_text
 from guided_lgp.experiments.studies import OUTCOMES, RESULTS, StudyParams, StudyTable, load_study
 from guided_lgp.report.feasibility import feasibility_tables
 from guided_lgp.report.table import Record, Table
@@ -40,11 +40,9 @@ def render(root: Path) -> None:
     tables |= feasibility_tables(root)
     for name, table in tables.items():
         for suffix, text in (("tex", table.latex()), ("csv", table.csv())):
-            with written_whole(folder / f"{name}.{suffix}") as file:
-                file.write_text(text, encoding="utf-8")
-    with written_whole(root / RESULTS / "studies.md") as file:
-        sections = [table.markdown() for table in tables.values()]
-        file.write_text("\n".join(["# Studies", "", *sections]), encoding="utf-8")
+            write_text(folder / f"{name}.{suffix}", text)
+    sections = [table.markdown() for table in tables.values()]
+    write_text(root / RESULTS / "studies.md", "\n".join(["# Studies", "", *sections]))
     logger.info("studies: %s", root / RESULTS / "studies.md")
 
 
