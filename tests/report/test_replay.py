@@ -1,4 +1,5 @@
 import re
+from itertools import combinations
 from pathlib import Path
 from threading import Event, Thread
 from urllib.request import urlopen
@@ -7,12 +8,14 @@ import numpy as np
 import outputs
 import pytest
 
+from guided_lgp.errors import InputError
 from guided_lgp.report.live import view
 from guided_lgp.report.replay import play, replay_html
-from guided_lgp.report.viewer import Viewer
+from guided_lgp.report.viewer import Viewer, box_colours
 from guided_lgp.scene import Scene, generate
 from guided_lgp.scene.poses import compose, inverse, pose
 from guided_lgp.scene.pr2 import ARM_JOINTS, tool_pose
+from guided_lgp.scene.world import COLOURS
 
 
 @pytest.fixture(scope="module")
@@ -55,6 +58,28 @@ def test_page_is_self_contained_deterministic_and_escaped(scene: Scene, tmp_path
     assert "<title>Replay: &lt;b&gt;scene" in text
     head = re.sub(r'"[A-Za-z0-9+/=]{1000,}"', "", text)
     assert not re.search(r"<(script|link|img)[^>]+(src|href)=[\"']?(https?:|//)", head)
+
+
+def test_a_full_disk_leaves_no_page(scene: Scene, tmp_path: Path) -> None:
+    (tmp_path / ".unfinished-page.html").symlink_to("/dev/full")
+    with pytest.raises(InputError, match="No space left on device"):
+        replay_html(outputs.motion(scene.boxes[0].name), scene, tmp_path / "page.html")
+    assert list(tmp_path.iterdir()) == []
+
+
+def named(scene: Scene, *names: str) -> Scene:
+    """The scene with copies of its first box under these names."""
+    boxes = tuple(scene.boxes[0].model_copy(update={"name": name}) for name in names)
+    return scene.model_copy(update={"boxes": boxes})
+
+
+def test_boxes_are_told_apart_by_colour(scene: Scene) -> None:
+    mug, red, jar = box_colours(named(scene, "mug", "red", "jar"))
+    assert red == COLOURS["red"]
+    assert box_colours(named(scene, "mug", "blue", "tin")) == [mug, COLOURS["blue"], jar]
+    ten = box_colours(named(scene, *(f"box{number}" for number in range(10))))
+    assert ten[:2] == [mug, jar]
+    assert min(np.linalg.norm(np.subtract(a, b)) for a, b in combinations(ten, 2)) > 0.1
 
 
 def test_live_view_serves_the_loopback_interface_until_stopped(scene: Scene) -> None:

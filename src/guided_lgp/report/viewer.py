@@ -2,7 +2,9 @@
 
 import io
 from collections.abc import Mapping
+from colorsys import hsv_to_rgb
 from contextlib import redirect_stdout
+from itertools import count
 from typing import Any, Self
 
 import numpy as np
@@ -20,8 +22,13 @@ from guided_lgp.scene.pr2 import (
 )
 from guided_lgp.scene.world import COLOURS, TABLE_THICKNESS
 
+Colour = tuple[float, float, float]
+
 _SHELL, _HAND = (0.89, 0.89, 0.88), (0.47, 0.48, 0.51)
-_OTHER_BOX, _OTHER_TABLE = (0.25, 0.65, 0.68), (0.81, 0.75, 0.66)
+_OTHER_TABLE = (0.81, 0.75, 0.66)
+_FIRST_HUE, _HUE_STEP = 0.51, (5**0.5 - 1) / 2
+"""Hues of the boxes that no colour is named after, in turns from red: teal, then golden sections
+of the circle, which keep any number of hues apart."""
 
 
 class Viewer:
@@ -134,13 +141,22 @@ class Viewer:
                 cast_shadow=False,
                 **_pose(pose((x, y, top - TABLE_THICKNESS / 2), table.yaw)),
             )
-        for box in self.scene.boxes:
+        for box, colour in zip(self.scene.boxes, box_colours(self.scene), strict=True):
             self._boxes[box.name] = scene.add_box(
                 f"/boxes/{box.name}",
-                COLOURS.get(box.name, _OTHER_BOX),
+                colour,
                 box.size,
                 **_pose(pose(box.position, box.yaw)),
             )
+
+
+def box_colours(scene: Scene) -> list[Colour]:
+    """The colour (RGB in 0..1) of each box: what its name says, else one of its own."""
+    hues = (_FIRST_HUE + number * _HUE_STEP for number in count())
+    return [
+        COLOURS[box.name] if box.name in COLOURS else hsv_to_rgb(next(hues) % 1, 0.63, 0.68)
+        for box in scene.boxes
+    ]
 
 
 def _pose(transform: Array) -> dict[str, Any]:
