@@ -15,7 +15,6 @@ import dask
 import numpy as np
 import psutil
 import pytest
-from dask.distributed import LocalCluster
 from numpy.typing import NDArray
 
 from guided_lgp import parallel
@@ -94,11 +93,17 @@ from guided_lgp.params import Parallel
 run(keep_busy, 2 * [Path({folder!r})], Parallel(backend={backend!r}, workers=2), "busy")
 """
 STAGE = """
-import os, signal, sys
-from guided_lgp.parallel import end_with_parent
-signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
-end_with_parent(os.getppid(), signal.SIGTERM)
+from guided_lgp.cli import end_with_dvc
+end_with_dvc()
 """
+STUDY = """
+import runpy, sys
+from guided_lgp.experiments import studies
+studies.train = lambda root, case: exec({fan_out!r}, {{}})
+sys.argv[1:] = ["train", "paper"]
+runpy.run_path({script!r}, run_name="__main__")
+"""
+STUDIES = Path(__file__).parents[1] / "studies" / "run.py"
 STARTER = "import subprocess, sys; subprocess.run([sys.executable, '-c', sys.argv[1]])"
 
 
@@ -194,9 +199,14 @@ def test_workers_end_with_the_process_that_started_them(
     wait_until(lambda: all(map(gone, below)), 60)
 
 
-def test_a_stage_and_its_workers_end_with_the_process_that_runs_stages(tmp_path: Path) -> None:
-    stage = STAGE + FAN_OUT.format(folder=str(tmp_path), backend="loky")
-    runner, below = start(tmp_path, STARTER, stage)
+@pytest.mark.parametrize("kind", ["pipeline", "studies"])
+def test_a_stage_and_its_workers_end_with_the_process_that_runs_stages(
+    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("DVC_STAGE", "stage")
+    fan_out = FAN_OUT.format(folder=str(tmp_path), backend="loky")
+    study = STUDY.format(fan_out=fan_out, script=str(STUDIES))
+    runner, below = start(tmp_path, STARTER, STAGE + fan_out if kind == "pipeline" else study)
     runner.kill()
     runner.wait(60)
     wait_until(lambda: all(map(gone, below)), 60)
@@ -224,24 +234,6 @@ def test_a_task_that_kills_dask_workers_is_reported(monkeypatch: pytest.MonkeyPa
         pytest.raises(WorkerError, match="a worker process was killed"),
     ):
         run(die, range(2), Parallel(backend="dask", workers=1), "solve")
-
-
-@pytest.fixture
-def machines(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[subprocess.Popen[bytes]]]:
-    """Two Dask workers that nobody restarts, as on two machines, and their scheduler."""
-    words = [sys.executable, "-m", "distributed.cli.dask_worker", "--no-nanny", "--no-dashboard"]
-    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parent)}
-    with LocalCluster(n_workers=0, dashboard_address=None) as cluster:
-        command = [*words, "--nthreads", "1", cluster.scheduler_address]
-        workers = [
-            subprocess.Popen(command, env=environment, stderr=subprocess.DEVNULL) for _ in range(2)
-        ]
-        monkeypatch.setenv("DASK_SCHEDULER_ADDRESS", cluster.scheduler_address)
-        wait_until(lambda: len(cluster.scheduler_info["workers"]) == 2, 60)
-        yield workers
-        for worker in workers:
-            worker.kill()
-            worker.wait()
 
 
 def test_a_dask_cluster_behaves_like_the_workers_of_one_machine(

@@ -1,25 +1,28 @@
-"""Whatever dies, the enumeration goes on to the same bytes.
+"""Whatever dies, enumeration and evaluation go on to the same bytes.
 
 The whole pipeline under DVC, killed at more moments: `make verify-interruption`.
 """
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from threading import Thread
 
 import numpy as np
 import pytest
-from dask.distributed import LocalCluster
+from dask.distributed import Client
 
-from guided_lgp.experiments import enumerate_sequences
-from guided_lgp.params import load_params
+from guided_lgp.experiments import enumerate_sequences, evaluate_generalization
+from guided_lgp.params import Params, load_params
 from guided_lgp.scene import generate
 
 SMALL = Path(__file__).parents[1] / "params.yaml"
+MODELS = Path(__file__).parents[2] / "models"
 SHARDS = 5
 KILLS = 3
 SEED = 1
@@ -84,7 +87,7 @@ def make_root(folder: Path) -> Path:
 
 
 def written(root: Path) -> dict[str, bytes]:
-    files = (root / "data").rglob("*")
+    files = root.rglob("*")
     return {str(file.relative_to(root)): file.read_bytes() for file in files if file.is_file()}
 
 
@@ -113,34 +116,73 @@ def test_a_kill_costs_at_most_the_shard_in_progress(
 
 
 def kill_after_the_first_shard(worker: subprocess.Popen[bytes], shards: Path) -> None:
+    if within_a_minute(lambda: any(not folder.suffix for folder in shards.glob("*"))):
+        worker.kill()
+
+
+def kill_at_work(worker: subprocess.Popen[bytes]) -> None:
+    """Kill a worker when both have had their task for a second."""
+    with Client(os.environ["DASK_SCHEDULER_ADDRESS"]) as client:
+        at_work = within_a_minute(lambda: all(client.processing().values()))
+    if at_work:
+        time.sleep(1)
+        worker.kill()
+
+
+def within_a_minute(condition: Callable[[], bool]) -> bool:
     end = time.monotonic() + 60
-    while time.monotonic() < end and not any(not folder.suffix for folder in shards.glob("*")):
+    while time.monotonic() < end:
+        if condition():
+            return True
         time.sleep(0.02)
-    worker.kill()
+    return False
 
 
-def test_a_dask_cluster_that_loses_a_worker_writes_the_same_bytes(
-    undisturbed: tuple[dict[str, bytes], float], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_an_enumeration_on_dask_that_loses_a_worker_writes_the_same_bytes(
+    undisturbed: tuple[dict[str, bytes], float],
+    machines: list[subprocess.Popen[bytes]],
+    tmp_path: Path,
 ) -> None:
     root = make_root(tmp_path)
-    params = load_params(SMALL)
-    on_dask = params.parallel.model_copy(update={"backend": "dask"})
-    words = [sys.executable, "-m", "distributed.cli.dask_worker", "--no-nanny", "--no-dashboard"]
-    with LocalCluster(n_workers=0, dashboard_address=None) as cluster:
-        monkeypatch.setenv("DASK_SCHEDULER_ADDRESS", cluster.scheduler_address)
-        command = [*words, "--nthreads", "1", cluster.scheduler_address]
-        environment = os.environ | {"OMP_NUM_THREADS": "1"}
-        workers = [
-            subprocess.Popen(command, env=environment, stderr=subprocess.DEVNULL) for _ in range(2)
-        ]
-        killer = Thread(
-            target=kill_after_the_first_shard, args=(workers[0], root / "data" / ".shards")
-        )
-        killer.start()
-        enumerate_sequences.run(params.model_copy(update={"parallel": on_dask}), root)
-        killer.join()
-        assert workers[0].wait() == -signal.SIGKILL
-        assert workers[1].poll() is None
-        workers[1].terminate()
-        workers[1].wait()
+    killer = Thread(
+        target=kill_after_the_first_shard, args=(machines[0], root / "data" / ".shards")
+    )
+    killer.start()
+    enumerate_sequences.run(on_dask(load_params(SMALL)), root)
+    killer.join()
+    assert machines[0].wait(60) == -signal.SIGKILL
+    assert machines[1].poll() is None
     assert written(root) == undisturbed[0]
+
+
+def test_an_evaluation_on_dask_that_loses_a_worker_writes_the_same_bytes(
+    undisturbed: tuple[dict[str, bytes], float],
+    machines: list[subprocess.Popen[bytes]],
+    tmp_path: Path,
+) -> None:
+    params = load_params(SMALL)
+    short = params.evaluate_generalization.model_copy(update={"max_depth": 2, "max_paths": 1})
+    params = params.model_copy(update={"evaluate_generalization": short})
+    loky, dask = tmp_path / "loky", tmp_path / "dask"
+    for root in (loky, dask):
+        for name, content in undisturbed[0].items():
+            (root / name).parent.mkdir(parents=True, exist_ok=True)
+            (root / name).write_bytes(content)
+        shutil.copytree(MODELS, root / "models")
+    evaluate_generalization.run(params, loky)
+    killer = Thread(target=kill_at_work, args=(machines[0],))
+    killer.start()
+    evaluate_generalization.run(on_dask(params), dask)
+    killer.join()
+    assert machines[0].wait(60) == -signal.SIGKILL
+    assert machines[1].poll() is None
+    files = written(dask)
+    assert {"data/evaluation/generalization.parquet", "reports/metrics/generalization.json"} <= set(
+        files
+    )
+    assert files == written(loky)
+
+
+def on_dask(params: Params) -> Params:
+    parallel = params.parallel.model_copy(update={"backend": "dask"})
+    return params.model_copy(update={"parallel": parallel})
