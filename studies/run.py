@@ -1,16 +1,23 @@
 """The stages of studies/dvc.yaml: train CASE, evaluate TABLE, feasibility, render."""
 
-import logging
 import sys
 from pathlib import Path
 
+from guided_lgp.cli import end_with_dvc, run_program
 from guided_lgp.errors import InputError
-from guided_lgp.experiments import feasibility, studies
-from guided_lgp.report.studies import render
 
-logging.basicConfig(format="%(message)s", level=logging.INFO)
-try:
-    match sys.argv[1:]:
+
+def run(words: list[str]) -> None:
+    """Run one stage in the working directory.
+
+    Raises:
+        InputError: the words name no stage, or the stage's input is bad.
+    """
+    end_with_dvc()
+    from guided_lgp.experiments import feasibility, studies
+    from guided_lgp.report.studies import render
+
+    match words:
         case ["train", case]:
             studies.train(Path.cwd(), case)
         case ["evaluate", table]:
@@ -19,10 +26,10 @@ try:
             feasibility.run(Path.cwd())
         case ["render"]:
             render(Path.cwd())
-        case words:
-            raise InputError(
-                " ".join(words), "is no stage", "train CASE, evaluate TABLE, feasibility, render"
-            )
-except InputError as error:
-    print(f"error: {error}", file=sys.stderr)
-    sys.exit(2)
+        case _:
+            stages = "train CASE, evaluate TABLE, feasibility, render"
+            raise InputError("stage", f"unknown: {' '.join(words)}", stages)
+
+
+if __name__ == "__main__":
+    run_program(run, sys.argv[1:])

@@ -2,6 +2,8 @@
 
 import json
 import resource
+import runpy
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -12,7 +14,7 @@ import yaml
 from typer.main import get_command
 
 from guided_lgp import cli, doctor
-from guided_lgp.errors import WorkerError
+from guided_lgp.errors import InputError, WorkerError
 
 ROOT = Path(__file__).parents[1]
 SCENE = ROOT / "examples" / "three_boxes.json"
@@ -112,6 +114,8 @@ def test_heavy_packages_are_not_imported_for_help() -> None:
         (["plan", str(SCENE), "--goal", "(held pink)"], "unknown box 'pink'"),
         (["plan", str(SCENE), "--goal", "(on red tab1)"], "already holds"),
         (["plan", "none.json", "--goal", "(held red)"], "none.json: No such file"),
+        (["view", "none.json"], "none.json: No such file"),
+        (["view", str(ROOT / "README.md")], "README.md: is not JSON"),
         (["generate_scenes", "--params", "none.yaml"], "none.yaml: No such file"),
         (["mlflow", "ui", "--port", "0"], "--port"),
     ],
@@ -210,6 +214,36 @@ def test_errors_of_the_program_end_with_3(
         cli.main(["doctor"])
     assert ended.value.code == 3
     assert capsys.readouterr().err == line
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "line"),
+    [
+        (InputError("cases", "unknown: x", "paper"), 2, "cases: unknown: x (accepted: paper)"),
+        (WorkerError("train: task 1 of 2 failed"), 3, "train: task 1 of 2 failed"),
+        (KeyError("x"), 3, "internal error: KeyError: 'x'; --debug shows where"),
+    ],
+)
+def test_errors_of_the_studies_are_one_line_too(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    error: Exception,
+    code: int,
+    line: str,
+) -> None:
+    def fail(root: Path, case: str) -> None:
+        raise error
+
+    monkeypatch.setattr("guided_lgp.experiments.studies.train", fail)
+    monkeypatch.setattr("sys.argv", ["run.py", "train", "x"])
+    before = signal.getsignal(signal.SIGTERM)
+    try:
+        with pytest.raises(SystemExit) as ended:
+            runpy.run_path(str(ROOT / "studies" / "run.py"), run_name="__main__")
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert ended.value.code == code
+    assert capsys.readouterr().err == f"error: {line}\n"
 
 
 def test_plan_writes_actions_and_a_replay(

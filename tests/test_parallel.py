@@ -209,7 +209,7 @@ def test_a_stage_and_its_workers_end_with_the_process_that_runs_stages(
     runner, below = start(tmp_path, STARTER, STAGE + fan_out if kind == "pipeline" else study)
     runner.kill()
     runner.wait(60)
-    wait_until(lambda: all(map(gone, below)), 60)
+    wait_until(lambda: all(map(gone, below)), 30)  # half as long as the tasks would take
 
 
 def test_progress_in_a_pipe_is_a_line_per_milestone(caplog: pytest.LogCaptureFixture) -> None:

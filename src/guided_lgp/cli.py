@@ -9,17 +9,18 @@ import logging
 import os
 import signal
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
 from enum import StrEnum
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NoReturn
 
 import typer
 from typer.exceptions import TyperException
 
+from guided_lgp.documents import read_json
 from guided_lgp.errors import InputError, WorkerError
 from guided_lgp.paths import MODELS, PARAMS, SOURCES
 
@@ -99,7 +100,7 @@ def _options(
         typer.Option("--debug", help="Show the traceback of an error.", show_default="one line"),
     ] = False,
 ) -> None:
-    logging.getLogger("guided_lgp").setLevel(logging.DEBUG if debug else logging.INFO)
+    """Declare for the help what :func:`run_program` acts on, wherever it stands."""
 
 
 @app.command()
@@ -448,14 +449,12 @@ def mlflow_sync() -> None:
 
 def _run_stage(stage: str, params_file: Path, *arguments: str) -> None:
     """Check all parameters, then run a stage and record it."""
-    from guided_lgp import parallel, tracking
+    from guided_lgp import tracking
     from guided_lgp.params import load_params
 
+    end_with_dvc()
     params = load_params(params_file)
     module = import_module(STAGES[stage])
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that the end is recorded
-    if "DVC_STAGE" in os.environ:
-        parallel.end_with_parent(os.getppid(), signal.SIGTERM)
     with tracking.recorded("@".join([stage, *arguments]), params):
         module.run(params, Path.cwd(), *arguments)
 
@@ -477,11 +476,13 @@ def _show(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
 
 
 def _is_plan(file: Path) -> bool:
-    """Whether a file is a plan; a file that cannot be read is left to the reader of scenes."""
-    try:
-        return "actions" in json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError, TypeError, RecursionError):
-        return False
+    """Whether a file is a plan; what is not is left to the reader of scenes.
+
+    Raises:
+        InputError: the file is missing or is not JSON.
+    """
+    document = read_json(file, "a scene, or a plan written by plan --out")
+    return isinstance(document, dict) and "actions" in document
 
 
 @contextmanager
@@ -502,13 +503,25 @@ def stage_main(stage: str) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run a command; every error becomes one line on standard error and an exit code."""
-    words = list(sys.argv[1:] if arguments is None else arguments)
-    debug = "--debug" in words
-    words = [word for word in words if word != "--debug"]
+    """Run a command."""
+    run_program(
+        lambda words: app(words, standalone_mode=False),
+        sys.argv[1:] if arguments is None else arguments,
+    )
+
+
+def run_program(program: Callable[[list[str]], int | None], arguments: Sequence[str]) -> NoReturn:
+    """Run a program; every error becomes one line on standard error and an exit code.
+
+    Args:
+        program: is given the words of the command line; what it returns is the exit code.
+        arguments: these words, and anywhere among them ``--debug`` for the traceback of an error.
+    """
+    debug = "--debug" in arguments
     logging.basicConfig(format="%(message)s", level=logging.WARNING)
+    logging.getLogger("guided_lgp").setLevel(logging.DEBUG if debug else logging.INFO)
     try:
-        code = app(["--debug", *words] if debug else words, standalone_mode=False)
+        code = program([word for word in arguments if word != "--debug"])
     except (InputError, TyperException) as error:
         _fail(error, 2, debug)
     except KeyboardInterrupt:
@@ -518,7 +531,19 @@ def main(arguments: Sequence[str] | None = None) -> None:
     sys.exit(code)
 
 
-def _fail(error: Exception, code: int, debug: bool) -> None:
+def end_with_dvc() -> None:
+    """Have this process end when the DVC that started it, if one did, is gone.
+
+    It ends as on SIGTERM: its workers with it, and the end is recorded.
+    """
+    from guided_lgp import parallel
+
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
+    if "DVC_STAGE" in os.environ:
+        parallel.end_with_parent(os.getppid(), signal.SIGTERM)
+
+
+def _fail(error: Exception, code: int, debug: bool) -> NoReturn:
     if debug:
         raise error
     text = error.format_message() if isinstance(error, TyperException) else str(error)
