@@ -28,7 +28,13 @@ PARAMS = load_params(ROOT / "params.yaml")
 METRICS = {
     "version": 1,
     "seed": 5,
-    "sub_policies": {"box": {"accuracy": 0.9, "curves": {"loss": [2.0, 1.0, 0.5]}}},
+    "sub_policies": {
+        "box": {
+            "accuracy": 0.9,
+            "curves": {"loss": [2.0, 1.0, 0.5]},
+            "by_configuration": {"accuracy": 0.8},
+        }
+    },
     "note": "text",
     "nan": None,
 }
@@ -147,20 +153,35 @@ def test_one_parent_per_execution_and_a_child_per_stage(clone: Path) -> None:
         assert child.data.params["seed_training"] == str(PARAMS.generate_scenes.seed_training)
         assert child.info.status == parent.info.status == "FINISHED"
     assert parent.data.params["train_policy.place.dropout"] == "0.1"
-    assert parent.data.metrics["training/place/box/accuracy"] == 0.9
+    assert parent.data.metrics == {"training/place/box/accuracy": 0.9}
     assert first.data.tags[tracking.KEY_TAG] == second.data.tags[tracking.KEY_TAG]
 
 
 def test_metrics_curves_and_files_are_recorded(clone: Path) -> None:
     record()
     (child,) = children()
-    assert child.data.metrics == {"box/accuracy": 0.9, "box/loss": 0.5}
+    assert child.data.metrics == {
+        "box/accuracy": 0.9,
+        "box/loss": 0.5,
+        "box/by_configuration/accuracy": 0.8,
+    }
     client = tracking.prepare()
     curve = client.get_metric_history(child.info.run_id, "box/loss")
     assert [(point.step, point.value) for point in curve] == [(0, 2.0), (1, 1.0), (2, 0.5)]
     listings = [client.list_artifacts(child.info.run_id, folder) for folder in (None, "training")]
     files = [item.path for listing in listings for item in listing]
     assert files == ["report.md", "training", "training/place.json"]
+
+
+def test_what_the_parent_selects_is_in_the_reports() -> None:
+    groups, figures = set(), set()
+    for file in (ROOT / "reports" / "metrics").glob("*.json"):
+        for name in tracking.flatten(json.loads(file.read_text()), "/"):
+            *above, figure = name.split("/")
+            groups |= set(above)
+            figures.add(figure)
+    assert figures >= tracking.COMPARED
+    assert groups >= tracking.DETAILS
 
 
 @pytest.fixture

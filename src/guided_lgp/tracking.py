@@ -1,14 +1,14 @@
 """MLflow: one parent run per pipeline execution, one child per stage (DESIGN §7).
 
-A stage records itself when it has finished, from the files it has written. What DVC restores from
-its cache is recorded by :func:`sync` from the same files. Every child carries a key made of all
-that determines the stage's results, so what has been recorded is not recorded again. Results never
-depend on tracking: its failures become a warning.
+A stage records itself when it has finished, from the files it has written: everything in its own
+run, and in the parent's what executions are compared by. What DVC restores from its cache is
+recorded by :func:`sync` from the same files. Every child carries a key made of all that determines
+the stage's results, so what has been recorded is not recorded again. Results never depend on
+tracking: its failures become a warning.
 """
 
 import json
 import logging
-import math
 import os
 import platform
 import shutil
@@ -22,6 +22,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
 
+from guided_lgp.documents import read_json
 from guided_lgp.errors import InputError
 from guided_lgp.params import Params
 from guided_lgp.paths import PARAMS
@@ -37,6 +38,15 @@ STATE_TAG = "guided_lgp.state"
 PROCESS_TAG = "guided_lgp.process"
 BATCH = 500
 """Metrics per request; MLflow accepts at most 1000."""
+
+COMPARED = frozenset(
+    ("accuracy", "shortest", "feasible", "no_solution", "solved", "tree_size_mean", "time_mean_s")
+)
+"""Figures of the stages that the parent run has too, since these runs are compared."""
+DETAILS = frozenset(("by_configuration", "astar", "breadth_first_graph", "uniform_best_first"))
+"""Groups of which it has none: the other split, and controls beside the planners of the paper.
+
+A comparison draws a chart per figure; those of all groups would be two thousand."""
 
 logger = logging.getLogger(__name__)
 
@@ -211,10 +221,13 @@ class _Run:
         read = [file for path in stage.dependencies for file in _files(Path(path))]
         for file in [*read, *reports]:
             if file.parts[0] == "reports" and file.suffix == ".json":
-                scalars = {name: [values[-1]] for name, values in _read_metrics(file).items()}
                 group = "/".join(file.with_suffix("").parts[1:]).removeprefix("metrics/")
-                prefixed = {f"{group}/{name}": values for name, values in scalars.items()}
-                _log_metrics(self._client, self._parent, prefixed)
+                scalars = {
+                    f"{group}/{name}": [values[-1]]
+                    for name, values in _read_metrics(file).items()
+                    if _is_compared(name)
+                }
+                _log_metrics(self._client, self._parent, scalars)
         self._end("FINISHED")
 
     def _log_models(self, weights: list[Path]) -> None:
@@ -313,7 +326,7 @@ def _read_metrics(file: Path) -> dict[str, list[float]]:
 
     MLflow groups its charts by what stands before the last slash of a name.
     """
-    document = json.loads(file.read_text(encoding="utf-8"))
+    document = read_json(file)
     metrics = {}
     for path, value in flatten(document if isinstance(document, dict) else {}, "/").items():
         name = "/".join(part for part in path.split("/") if part not in ("sub_policies", "curves"))
@@ -324,12 +337,13 @@ def _read_metrics(file: Path) -> dict[str, list[float]]:
     return metrics
 
 
+def _is_compared(name: str) -> bool:
+    *groups, figure = name.split("/")
+    return figure in COMPARED and DETAILS.isdisjoint(groups)
+
+
 def _is_number(value: object) -> bool:
-    return (
-        isinstance(value, int | float)
-        and not isinstance(value, bool)
-        and math.isfinite(float(value))
-    )
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _files(path: Path) -> list[Path]:
