@@ -11,7 +11,7 @@ from guided_lgp.policy.dataset import Dataset
 from guided_lgp.policy.encoding import CHAINS
 from guided_lgp.policy.samples import build_dataset
 from guided_lgp.policy.split import training_objectives
-from guided_lgp.policy.train import train_models, train_network, validation_samples
+from guided_lgp.policy.train import held_out_samples, train_models, train_network
 
 NETWORK = Network(layers=2, nodes=16, dropout=0.1, l2=1e-4, epochs=3, batch=64, lr=1e-3)
 SETTINGS = TrainPolicy(
@@ -66,11 +66,11 @@ def test_the_report_holds_curves_confusion_and_both_splits(
 
 def test_the_split_by_configuration_shares_no_configuration(dataset: Dataset) -> None:
     configuration = dataset.configuration[dataset.sample_state]
-    held_out = validation_samples(dataset, "configuration", SETTINGS)
+    held_out = held_out_samples(configuration, "configuration", SETTINGS)
     assert not set(configuration[held_out]) & set(configuration[~held_out])
     assert len(set(configuration[held_out])) == 1  # a fifth of five
 
-    random = validation_samples(dataset, "random", SETTINGS)
+    random = held_out_samples(configuration, "random", SETTINGS)
     assert np.count_nonzero(random) == round(0.2 * len(dataset))
     assert set(configuration[random]) == set(configuration[~random])
 

@@ -83,5 +83,5 @@ def test_the_seed_decides_about_everything() -> None:
 def test_a_training_that_diverges_says_so() -> None:
     inputs, classes = problem(100)
     inputs[0, 0] = np.inf
-    with pytest.raises(InputError, match=r"train_policy.*not finite"):
+    with pytest.raises(InputError, match=r"lr: the loss is not finite"):
         train((inputs, classes), (inputs, classes), epochs=2)

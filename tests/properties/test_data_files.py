@@ -229,7 +229,7 @@ def dataset(folder: Path) -> Path:
         states=rng.normal(size=(20, encoding.state_size)).astype(np.float32),
         actions=np.tile(np.array([[0, 1, 2, -1], [1, 0, 2, 4]], np.int8), (10, 1)),
         supports=rng.integers(-2, 5, (20, 3)).astype(np.int8),
-        configuration=np.zeros(20, np.int16),
+        configuration=np.zeros(20, np.int32),
         goals=rng.integers(0, 2, (5, 20)).astype(np.float32),
         sample_state=rng.integers(0, 20, 30).astype(np.int32),
         sample_goals=rng.integers(0, 5, 30).astype(np.int32),

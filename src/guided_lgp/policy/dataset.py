@@ -26,7 +26,7 @@ _ARRAYS = {
     "states": np.float32,
     "actions": np.int8,
     "supports": np.int8,
-    "configuration": np.int16,
+    "configuration": np.int32,
     "goals": np.float32,
     "sample_state": np.int32,
     "sample_goals": np.int32,
@@ -61,7 +61,7 @@ class Dataset:
     supports: NDArray[np.int8]
     """(M, boxes) what each box stands on before it, in the order of the slots: a class of table,
     or -1 - g if gripper g holds the box."""
-    configuration: NDArray[np.int16]
+    configuration: NDArray[np.int32]
     """(M,) index of the configuration."""
     goals: FloatArray
     """(G, goals · goal_size) the encoded objectives, in both orders of their goals."""

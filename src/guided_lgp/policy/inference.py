@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guided_lgp.errors import InputError
-from guided_lgp.logic import Action, Objective, State, Symbols
+from guided_lgp.logic import Action, Objective, State
 from guided_lgp.policy.encoding import CHAINS, INSTRUCTIONS, Encoding, FloatArray
 from guided_lgp.policy.models import Layers, Model, load_model
 from guided_lgp.policy.relational.inference import RelationalPolicy, load_relational
-from guided_lgp.scene import GRIPPERS
+from guided_lgp.policy.symbols import declared_symbols
 
 POLICIES = ("paper", "improved", "relational")
 """The trained policies: the paper's networks, the same ones with the improved recipe, and one
@@ -45,12 +45,7 @@ class HierarchicalPolicy:
         The order of ``positions`` is the order in which the symbols are declared, which decides
         about their slots.
         """
-        boxes = {name for name, _ in state.support + state.held}
-        symbols = Symbols(
-            grippers=GRIPPERS,
-            boxes=tuple(name for name in positions if name in boxes),
-            surfaces=tuple(name for name in positions if name not in {*GRIPPERS, *boxes}),
-        )
+        symbols = declared_symbols(state, positions)
         slots = self.encoding.fill(objective, state, symbols)
         code = np.concatenate(
             [

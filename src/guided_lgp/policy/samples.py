@@ -119,7 +119,7 @@ def build_dataset(
         states.append(paths.states[used])
         actions.append(paths.actions[used])
         supports.append(paths.supports[used])
-        configuration.append(np.full(len(used), index, dtype=np.int16))
+        configuration.append(np.full(len(used), index, dtype=np.int32))
         first += len(used)
 
     if not sum(map(len, sample_state)):

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from guided_lgp.documents import write_json
 from guided_lgp.errors import InputError
 from guided_lgp.parallel import run
-from guided_lgp.params import Network, Parallel, TrainPolicy
+from guided_lgp.params import Network, Parallel, TrainPolicy, TrainRelational
 from guided_lgp.policy.dataset import Dataset
 from guided_lgp.policy.encoding import CHAINS
 from guided_lgp.policy.models import Model
@@ -103,8 +103,8 @@ def train_network(
         sub_policies={
             name: {
                 "classes": dataset.class_names(name),
-                **_figures(results["random", name]),
-                "by_configuration": _figures(results["configuration", name]),
+                **results["random", name].figures(),
+                "by_configuration": results["configuration", name].figures(),
             }
             for name in CHAINS[network]
         },
@@ -131,7 +131,8 @@ def train_models(dataset: Dataset, settings: TrainPolicy, split: str) -> dict[st
 
 
 def _tasks(network: str, dataset: Dataset, settings: TrainPolicy, split: str) -> list[_Task]:
-    validation = validation_samples(dataset, split, settings)
+    configuration = dataset.configuration[dataset.sample_state]
+    validation = held_out_samples(configuration, split, settings)
     held_out = validation[dataset.of_network(network)]
     if held_out.all() or not held_out.any():
         raise InputError(
@@ -177,36 +178,16 @@ def _train(task: _Task) -> Fit:
         patience=task.patience,
         seed=task.seed,
     )
-    best = result.best_epoch - 1
-    logger.info(
-        "%s: validation loss %.3f, accuracy %.3f at epoch %d of %d",
-        task.name,
-        result.curves["validation_loss"][best],
-        result.curves["validation_accuracy"][best],
-        result.best_epoch,
-        len(result.curves["validation_loss"]),
-    )
+    logger.info("%s: %s", task.name, result)
     return result
 
 
-def validation_samples(dataset: Dataset, split: str, settings: TrainPolicy) -> BoolArray:
-    """(N,) the samples held out; the same ones for every network."""
+def held_out_samples(
+    configuration: NDArray[np.integer], split: str, settings: TrainPolicy | TrainRelational
+) -> BoolArray:
+    """(N,) the samples for validation, of N samples of which (N,) configurations are given."""
     rng = np.random.default_rng(np.random.SeedSequence([settings.seed, SPLITS.index(split)]))
-    units = len(dataset) if split == "random" else len(dataset.configurations)
-    chosen = np.zeros(units, dtype=bool)
-    chosen[rng.permutation(units)[: max(1, round(settings.validation_share * units))]] = True
-    if split == "random":
-        return chosen
-    return chosen[dataset.configuration[dataset.sample_state]]
-
-
-def _figures(result: Fit) -> dict[str, Any]:
-    curves = result.curves
-    return {
-        "accuracy": curves["validation_accuracy"][result.best_epoch - 1],
-        "loss": curves["validation_loss"][result.best_epoch - 1],
-        "epochs": len(curves["validation_loss"]),
-        "best_epoch": result.best_epoch,
-        "confusion": result.confusion.tolist(),
-        "curves": curves,
-    }
+    unit = np.arange(len(configuration)) if split == "random" else configuration
+    units = np.unique(unit)
+    count = max(1, round(settings.validation_share * len(units)))
+    return np.isin(unit, rng.permutation(units)[:count])

@@ -2,7 +2,7 @@
 
 import logging
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -136,17 +136,38 @@ class BestParameters(Callback):
 
 
 @dataclass(frozen=True)
-class Fit:
-    """A trained classifier."""
+class Learning:
+    """How a training went."""
 
-    layers: Layers
-    """Of the best epoch."""
     best_epoch: int
-    """From 1; the epoch of the lowest validation loss."""
+    """From 1; the epoch of the lowest validation loss, whose weights are kept."""
     curves: Mapping[str, list[float]]
     """Loss (nats) and accuracy per epoch; of training with dropout, of validation without."""
     confusion: NDArray[np.int64]
     """(classes, classes) validation samples by true class (row) and most probable class."""
+
+    def figures(self) -> dict[str, Any]:
+        """The JSON document: accuracy and loss on validation at the best epoch, and all else."""
+        return {
+            "accuracy": self.curves["validation_accuracy"][self.best_epoch - 1],
+            "loss": self.curves["validation_loss"][self.best_epoch - 1],
+            "epochs": len(self.curves["validation_loss"]),
+            "best_epoch": self.best_epoch,
+            "confusion": self.confusion.tolist(),
+            "curves": self.curves,
+        }
+
+    def __str__(self) -> str:
+        return (
+            "validation loss {loss:.3f}, accuracy {accuracy:.4f} at epoch {best_epoch} of {epochs}"
+        ).format(**self.figures())
+
+
+@dataclass(frozen=True)
+class Fit(Learning):
+    """A trained classifier."""
+
+    layers: Layers
 
 
 def fit(
@@ -175,30 +196,50 @@ def fit(
     weights, order = (np.random.Generator(np.random.SFC64(child)) for child in seed.spawn(2))
     sizes = [training[0].shape[1], *[settings.nodes] * settings.layers, classes]
     module = SubPolicy(Classifier(sizes, settings.dropout, weights), settings)
-    best = BestParameters()
     with one_quiet_thread():
-        lightning.Trainer(
-            accelerator="cpu",
-            devices=1,
-            max_epochs=settings.epochs,
-            callbacks=[best, EarlyStopping("validation_loss", patience=patience)],
-            logger=False,  # the curves are part of the result, and MLflow gets them from there
-            num_sanity_val_steps=0,
-            enable_checkpointing=False,
-            enable_progress_bar=False,
-            enable_model_summary=False,
-        ).fit(module, WholeTensors(training, order), WholeTensors(validation))
+        samples = WholeTensors(training, order), WholeTensors(validation)
+        best_epoch = train(module, *samples, settings.epochs, patience)
         inputs, truth = map(torch.from_numpy, validation)
         chosen = module.classifier(inputs).argmax(1)
-    if best.epoch < 0:
-        raise InputError("train_policy: lr", "the loss is not finite", "a smaller learning rate")
     confusion = torch.bincount(truth * classes + chosen, minlength=classes**2)
     return Fit(
         layers=module.classifier.layers(),
-        best_epoch=best.epoch + 1,
+        best_epoch=best_epoch,
         curves=module.curves,
         confusion=confusion.view(classes, classes).numpy(),
     )
+
+
+def train(
+    module: lightning.LightningModule,
+    training: Iterable[Any],
+    validation: Iterable[Any],
+    epochs: int,
+    patience: int,
+) -> int:
+    """Train a module until its ``validation_loss`` stops falling; it gets its best parameters back.
+
+    Returns:
+        The best epoch, from 1.
+
+    Raises:
+        InputError: the validation loss was never finite.
+    """
+    best = BestParameters()
+    lightning.Trainer(
+        accelerator="cpu",
+        devices=1,
+        max_epochs=epochs,
+        callbacks=[best, EarlyStopping("validation_loss", patience=patience)],
+        logger=False,  # the curves are part of the result, and MLflow gets them from there
+        num_sanity_val_steps=0,
+        enable_checkpointing=False,
+        enable_progress_bar=False,
+        enable_model_summary=False,
+    ).fit(module, training, validation)
+    if best.epoch < 0:
+        raise InputError("params.yaml: lr", "the loss is not finite", "a smaller learning rate")
+    return best.epoch + 1
 
 
 @contextmanager

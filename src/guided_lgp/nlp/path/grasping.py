@@ -15,11 +15,10 @@ from guided_lgp.nlp.path.situation import Attach, Fingers, Situation, Step, matr
 from guided_lgp.nlp.path.spaces import wound
 from guided_lgp.nlp.path.task import (
     APPROACH,
-    CONFIGURATIONS,
-    ELBOWS,
     LIFT,
     PAN_SHIFTS,
     UP,
+    Choice,
     Outcome,
     Reach,
     Task,
@@ -79,31 +78,15 @@ class Grasping:
         if not np.isfinite(reach.cost).any():
             self._task.trouble.note(index, 0, f"no inverse kinematics for a grasp of {box}")
             return
-        approach, free = (
-            situation.still(gripper, [(gripper, box)]),
-            situation.still(gripper),
+        at, before = situation.still(gripper, [(gripper, box)]), situation.still(gripper)
+        yield from self._task.ways(
+            index,
+            reach,
+            reach.order(foresight.cost),
+            ((at, "grasp"), (before, "approach")),
+            lambda choice: self._grasp(index, situation, reach, choice),
+            foresight.possible,
         )
-        planned = np.zeros(len(grips), dtype=int)
-        for choice in reach.order(foresight.cost)[:CONFIGURATIONS]:
-            grip, pan, side = choice
-            if planned[grip] >= ELBOWS:
-                continue
-            at, before = reach.q[grip, :, pan, side]
-            blocked = self._task.mover.collision(approach, at[None])
-            if blocked is not None:
-                self._task.note(index, 1, "grasp collision", blocked)
-                continue
-            blocked = self._task.mover.collision(free, before[None])
-            if blocked is not None:
-                self._task.note(index, 2, "approach collision", blocked)
-                continue
-            if not foresight.possible(grip):
-                continue
-            planned[grip] += 1
-            outcome = self._grasp(index, situation, reach, choice)
-            if outcome is not None:
-                planned[grip] = ELBOWS
-                yield outcome
 
     def _coarse_grip(self, index: int) -> Grips:
         """The coarse solution's own grip."""
@@ -119,7 +102,7 @@ class Grasping:
         index: int,
         situation: Situation,
         reach: Reach,
-        choice: tuple[int, int, int],
+        choice: Choice,
     ) -> Outcome | None:
         """Plan all motions of a grasp, straight lines first."""
         action, state = self._task.skeleton[index], situation.state

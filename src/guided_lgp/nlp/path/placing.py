@@ -13,11 +13,10 @@ from guided_lgp.nlp.path.placements import alternatives, placed, placement_of
 from guided_lgp.nlp.path.situation import Attach, Fingers, Release, Situation, Step
 from guided_lgp.nlp.path.spaces import wound
 from guided_lgp.nlp.path.task import (
-    CONFIGURATIONS,
-    ELBOWS,
     LIFT,
     PAN_SHIFTS,
     UP,
+    Choice,
     Outcome,
     Reach,
     Task,
@@ -91,36 +90,21 @@ class Placing:
         if not np.isfinite(reach.cost).any():
             self._task.trouble.note(index, 0, f"no inverse kinematics to place {box}")
             return
-        down, free = (
-            situation.still(gripper, [(box, action.table)]),
-            situation.still(gripper),
+        at, above = situation.still(gripper, [(box, action.table)]), situation.still(gripper)
+        yield from self._task.ways(
+            index,
+            reach,
+            reach.order(),
+            ((at, "placing"), (above, "descent")),
+            lambda choice: self._place(index, situation, reach, choice, ways[choice[0]]),
         )
-        planned = np.zeros(len(targets), dtype=int)
-        for choice in reach.order()[:CONFIGURATIONS]:
-            number, pan, side = choice
-            if planned[number] >= ELBOWS:
-                continue
-            at, above = reach.q[number, :, pan, side]
-            blocked = self._task.mover.collision(down, at[None])
-            if blocked is not None:
-                self._task.note(index, 1, "placing collision", blocked)
-                continue
-            blocked = self._task.mover.collision(free, above[None])
-            if blocked is not None:
-                self._task.note(index, 2, "descent collision", blocked)
-                continue
-            planned[number] += 1
-            outcome = self._place(index, situation, reach, choice, ways[number])
-            if outcome is not None:
-                planned[number] = ELBOWS
-                yield outcome
 
     def _place(
         self,
         index: int,
         situation: Situation,
         reach: Reach,
-        choice: tuple[int, int, int],
+        choice: Choice,
         way: Array,
     ) -> Outcome | None:
         """Plan all motions of a place, straight lines first."""

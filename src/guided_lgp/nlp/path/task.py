@@ -1,6 +1,6 @@
 """What all ways to carry out the actions of a skeleton share, and the arm's reach at a contact."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,6 +29,10 @@ ELBOWS = 3
 """Elbow postures per grip or placement whose motions are planned."""
 PAN_SHIFTS = (0.0, 0.25, -0.25, 0.5, -0.5)
 """Turns of the pan joint (rad) on the straight way off a box that are tried."""
+
+
+Choice = tuple[int, int, int]
+"""Tool pose, pan angle and side of the elbow."""
 
 
 @dataclass(frozen=True)
@@ -69,8 +73,8 @@ class Reach:
     cost: Array
     """(N, P, 2): distance of the second from the home posture; infinite out of reach."""
 
-    def order(self, extra: Array | None = None) -> list[tuple[int, int, int]]:
-        """Pose, pan and side, cheapest first; ``extra`` (N,) is added to the cost."""
+    def order(self, extra: Array | None = None) -> list[Choice]:
+        """All configurations within reach, cheapest first; ``extra`` (N,) is added to the cost."""
         cost = self.cost if extra is None else self.cost + extra[:, None, None]
         flat = np.argsort(cost, axis=None, kind="stable")
         flat = flat[: int(np.isfinite(cost).sum())]
@@ -142,6 +146,47 @@ class Task:
         cost = np.where(np.isfinite(reach.cost), distance, np.inf)
         cost[..., 1 - side] = np.inf
         return replace(reach, cost=cost)
+
+    def ways(
+        self,
+        index: int,
+        reach: Reach,
+        order: Sequence[Choice],
+        stills: tuple[tuple[Still, str], tuple[Still, str]],
+        planned: Callable[[Choice], Outcome | None],
+        possible: Callable[[int], bool] = lambda pose: True,
+    ) -> Iterator[Outcome]:
+        """Carry out an action with the nearest configurations that are free of collisions.
+
+        Args:
+            index: of the action.
+            reach: configurations for every pose of the tool.
+            order: of the configurations; the first :data:`CONFIGURATIONS` are looked at.
+            stills: what stands still at the contact and off it, and the name of a collision there.
+            planned: plans all motions from one of the configurations.
+            possible: whether a pose of the tool is worth planning; asked before any motion is.
+        """
+        attempts = np.zeros(len(reach.cost), dtype=int)
+        for choice in order[:CONFIGURATIONS]:
+            pose, pan, side = choice
+            if attempts[pose] >= ELBOWS:
+                continue
+            if self._collides(index, reach.q[pose, :, pan, side], stills) or not possible(pose):
+                continue
+            attempts[pose] += 1
+            outcome = planned(choice)
+            if outcome is not None:
+                attempts[pose] = ELBOWS
+                yield outcome
+
+    def _collides(self, index: int, q: Array, stills: Sequence[tuple[Still, str]]) -> bool:
+        """Whether joints (2, 7) at the contact or off it collide, and note it."""
+        for stage, (joints, (still, name)) in enumerate(zip(q, stills, strict=True), 1):
+            blocked = self.mover.collision(still, joints[None])
+            if blocked is not None:
+                self.note(index, stage, f"{name} collision", blocked)
+                return True
+        return False
 
     def transit(self, still: Still, start: Array, goal: Array, level: bool) -> list[Motion] | None:
         """A free motion to joints ``goal`` (7,), with rests at some corners, or None."""

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from guided_lgp.logic import Action, Objective, State, Symbols
+from guided_lgp.logic import Action, Objective, State
 from guided_lgp.policy.relational.encoding import graphs, situation
 from guided_lgp.policy.relational.model import Weights, load_weights
-from guided_lgp.scene import GRIPPERS
+from guided_lgp.policy.symbols import declared_symbols
 
 
 class RelationalPolicy:
@@ -26,12 +26,7 @@ class RelationalPolicy:
         actions: Sequence[Action],
     ) -> NDArray[np.float64]:
         """Score applicable actions; see :class:`guided_lgp.search.policy.Policy`."""
-        boxes = {name for name, _ in state.support + state.held}
-        symbols = Symbols(
-            grippers=GRIPPERS,
-            boxes=tuple(name for name in positions if name in boxes),
-            surfaces=tuple(name for name in positions if name not in {*GRIPPERS, *boxes}),
-        )
+        symbols = declared_symbols(state, positions)
         problem = situation(objective, state, positions, symbols)
         scores = self._weights.scores(graphs(problem, self._weights.limits))[0]
         gripper = {name: row for row, name in enumerate(symbols.grippers)}

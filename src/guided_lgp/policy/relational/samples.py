@@ -33,7 +33,7 @@ class Examples:
     right: BoolArray
     """(N, G, T) whether grasping a box, or placing what is held on a table, by a gripper begins
     the rest of a shortest sequence."""
-    configuration: NDArray[np.int16]
+    configuration: NDArray[np.int32]
     """(N,) index of the configuration."""
 
     def __len__(self) -> int:

@@ -3,7 +3,6 @@
 import logging
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from guided_lgp.policy.relational.encoding import BoolArray
 from guided_lgp.policy.relational.model import NAME, Model
 from guided_lgp.policy.relational.samples import Examples, examples
 from guided_lgp.policy.relational.training import Fit, fit
-from guided_lgp.policy.train import SPLITS, TrainingReport
+from guided_lgp.policy.train import SPLITS, TrainingReport, held_out_samples
 
 logger = logging.getLogger(__name__)
 
@@ -61,8 +60,8 @@ def train_relational(
         sub_policies={
             "action": {
                 "classes": INSTRUCTIONS,
-                **_figures(fits["random"]),
-                "by_configuration": _figures(fits["configuration"]),
+                **fits["random"].figures(),
+                "by_configuration": fits["configuration"].figures(),
             }
         },
     )
@@ -79,7 +78,9 @@ def train_split(dataset: Dataset, settings: TrainRelational, split: str) -> Mode
 
 
 def _task(problems: Examples, split: str, settings: TrainRelational) -> _Task:
-    task = _Task(split, problems, _held_out(problems, split, settings), settings)
+    task = _Task(
+        split, problems, held_out_samples(problems.configuration, split, settings), settings
+    )
     held_out = np.count_nonzero(task.validation)
     if not 0 < held_out < len(problems):
         raise InputError(
@@ -95,14 +96,6 @@ def _model(task: _Task, result: Fit) -> Model:
     return Model(result.weights, training)
 
 
-def _held_out(problems: Examples, split: str, settings: TrainRelational) -> BoolArray:
-    rng = np.random.default_rng(np.random.SeedSequence([settings.seed, SPLITS.index(split)]))
-    unit = np.arange(len(problems)) if split == "random" else problems.configuration
-    units = np.unique(unit)
-    chosen = rng.permutation(units)[: max(1, round(settings.validation_share * len(units)))]
-    return np.isin(unit, chosen)
-
-
 def _train(task: _Task) -> Fit:
     result = fit(
         task.problems[~task.validation],
@@ -110,27 +103,5 @@ def _train(task: _Task) -> Fit:
         task.settings,
         np.random.SeedSequence([task.settings.seed, len(SPLITS)]),
     )
-    best = result.best_epoch - 1
-    logger.info(
-        "%s.%s: validation loss %.3f, accuracy %.4f at epoch %d of %d",
-        NAME,
-        task.split,
-        result.curves["validation_loss"][best],
-        result.curves["validation_accuracy"][best],
-        result.best_epoch,
-        len(result.curves["validation_loss"]),
-    )
+    logger.info("%s.%s: %s", NAME, task.split, result)
     return result
-
-
-def _figures(result: Fit) -> dict[str, Any]:
-    curves = result.curves
-    best = result.best_epoch - 1
-    return {
-        "accuracy": curves["validation_accuracy"][best],
-        "loss": curves["validation_loss"][best],
-        "epochs": len(curves["validation_loss"]),
-        "best_epoch": result.best_epoch,
-        "confusion": result.confusion.tolist(),
-        "curves": curves,
-    }

@@ -1,26 +1,24 @@
 """The relational network in Lightning: mini-batches, early stopping, learning curves."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from math import ceil
 
 import lightning
 import numpy as np
 import torch
-from lightning.pytorch.callbacks import EarlyStopping
 from numpy.typing import NDArray
 from torch import Tensor
 from torch.optim import Adam, Optimizer
 from torch.optim.lr_scheduler import CosineAnnealingLR
 
-from guided_lgp.errors import InputError
 from guided_lgp.params import TrainRelational
 from guided_lgp.policy.encoding import INSTRUCTIONS
 from guided_lgp.policy.relational.encoding import Range, applicable, graphs
 from guided_lgp.policy.relational.model import Weights
 from guided_lgp.policy.relational.network import RelationalNetwork
 from guided_lgp.policy.relational.samples import Examples
-from guided_lgp.policy.training import BestParameters, one_quiet_thread
+from guided_lgp.policy.training import Learning, one_quiet_thread, train
 
 CURVES = ("training_loss", "training_accuracy", "validation_loss", "validation_accuracy")
 
@@ -116,19 +114,14 @@ def log_probabilities(network: RelationalNetwork, batch: Batch) -> Tensor:
 
 
 @dataclass(frozen=True)
-class Fit:
-    """A trained network."""
+class Fit(Learning):
+    """A trained network.
+
+    Its accuracy is the share of problems whose most probable action is one of the right ones, its
+    classes are the instructions: of the most probable right action, and of the most probable one.
+    """
 
     weights: Weights
-    """Of the best epoch."""
-    best_epoch: int
-    """From 1; the epoch of the lowest validation loss."""
-    curves: Mapping[str, list[float]]
-    """Loss (nats) and accuracy per epoch: the share of problems whose most probable action is one
-    of the right ones."""
-    confusion: NDArray[np.int64]
-    """(2, 2) validation problems by instruction: of the most probable right action (row), and of
-    the most probable one."""
 
 
 def fit(
@@ -148,29 +141,19 @@ def fit(
     limits = Range.of(training.situations)
     batches = Batches(training, limits, settings.batch, np.random.default_rng(order))
     held_out = Batches(validation, limits, settings.batch)
-    best = BestParameters()
     with one_quiet_thread(), torch.random.fork_rng(devices=[]):
         torch.manual_seed(int(weights.generate_state(1)[0]))
         network = RelationalNetwork(settings.width, settings.rounds)
         module = RelationalPolicyModule(network, settings)
-        lightning.Trainer(
-            accelerator="cpu",
-            devices=1,
-            max_epochs=settings.epochs,
-            callbacks=[best, EarlyStopping("validation_loss", patience=settings.patience)],
-            logger=False,  # the curves are part of the result, and MLflow gets them from there
-            num_sanity_val_steps=0,
-            enable_checkpointing=False,
-            enable_progress_bar=False,
-            enable_model_summary=False,
-        ).fit(module, batches, held_out)
-        if best.epoch < 0:
-            raise InputError(
-                "train_relational: lr", "the loss is not finite", "a smaller learning rate"
-            )
+        best_epoch = train(module, batches, held_out, settings.epochs, settings.patience)
         confusion = _confusion(network, held_out)
     tensors = {name: part.numpy().copy() for name, part in network.state_dict().items()}
-    return Fit(Weights(limits, tensors), best.epoch + 1, module.curves, confusion)
+    return Fit(
+        weights=Weights(limits, tensors),
+        best_epoch=best_epoch,
+        curves=module.curves,
+        confusion=confusion,
+    )
 
 
 @torch.no_grad()
