@@ -15,18 +15,18 @@ def sentences(sizes: dict[str, Any], seconds: dict[str, Any]) -> list[str]:
     return findings.scalability({"c.1": sizes}, {"c.1": seconds})
 
 
-def test_a_rival_that_beats_guided_search_is_named_with_both_figures() -> None:
+def test_a_rival_that_beats_guided_search_is_named() -> None:
     text = sentences(
         {"guided": cell(99.0), "astar": cell(40.0), "breadth_first_graph": cell(5000.0)},
         {"guided": times(0.5), "astar": times(2.0), "breadth_first_graph": times(0.4)},
     )
     assert (
-        "A* generates fewer nodes than guided search on c.1 (40.0 against 99.0), and than every "
-        "guided planner on c.1." in text
+        "What generates fewer nodes than guided search: "
+        "A* (than Guided on c.1, than every guided planner on c.1)." in text
     )
     assert (
-        "Graph breadth-first needs less time without the path bound than guided search on c.1 "
-        "(0.400 s against 0.500 s), and than every guided planner on c.1." in text
+        "What needs less time without the path bound than guided search: "
+        "Graph breadth-first (than Guided on c.1, than every guided planner on c.1)." in text
     )
 
 
@@ -35,7 +35,7 @@ def test_a_rival_may_beat_one_guided_planner_and_not_another() -> None:
         {"guided": cell(99.0), "relational": cell(30.0), "astar": cell(40.0)},
         {"guided": times(0.5), "relational": times(0.5), "astar": times(2.0)},
     )
-    assert "A* generates fewer nodes than guided search on c.1 (40.0 against 99.0)." in text
+    assert "What generates fewer nodes than guided search: A* (than Guided on c.1)." in text
 
 
 def test_without_such_a_rival_the_text_says_so() -> None:
@@ -50,7 +50,7 @@ def test_a_rival_that_leaves_problems_unsolved_does_not_win() -> None:
         {"guided": cell(99.0), "astar": cell(40.0, solved=11)},
         {"guided": times(0.5), "astar": times(0.1)},
     )
-    assert not any(sentence.startswith("A*") for sentence in text)
+    assert not any("A*" in sentence for sentence in text)
 
 
 def test_problems_without_a_plan_are_counted() -> None:
@@ -58,7 +58,7 @@ def test_problems_without_a_plan_are_counted() -> None:
         {"guided": cell(99.0, solved=10), "guided_best_first": cell(99.0)},
         {"guided": times(0.5), "guided_best_first": times(0.5)},
     )
-    assert "Guided leaves without a plan: 2 of 12 on c.1." in text
+    assert "Not all the paper's problems: Guided solves 10 of 12 on c.1." in text
     assert (
         "All the paper's problems are solved, with a verified path, by Guided best-first." in text
     )
@@ -110,6 +110,6 @@ def test_many_boxes_name_the_effort_of_the_relational_policy() -> None:
         {"e.10": {"relational": times(0.6), "astar": times(None)}},
     )
     assert (
-        "e.10 (K = 20): the relational policy, greedy, solves 12 of 12 with 20.5 policy calls and "
-        "0.60 s on average without the path bound; A* solves 2." in text
+        "On e.10 (K = 20), of 12 problems, Relational solves 12, A* solves 2. Relational takes "
+        "20.5 policy calls and 0.60 s on average without the path bound." in text
     )

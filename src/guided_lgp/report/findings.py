@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 
+from guided_lgp.experiments.problems import Problem
 from guided_lgp.report import paper
 from guided_lgp.report.analysis import NEW, RENAMED, SEEN
 from guided_lgp.report.inputs import Metrics, compared
@@ -147,46 +148,56 @@ def _against_the_paper(metrics: Metrics) -> Iterator[str]:
 
 
 def _solved(metrics: Metrics) -> Iterator[str]:
-    """Who solves every problem, and what the guided planners leave, the paper's problems apart."""
-    problems = compared(metrics)
-    of_paper = [problem.name for problem in problems if problem.name in paper.SCALABILITY]
-    beyond = [problem.name for problem in problems if problem.name not in paper.SCALABILITY]
-    for names, which in ((of_paper, "the paper's problems"), (beyond, "problems of 6 to 10 boxes")):
+    """Who solves every problem, and what the guided planners solve, the paper's problems apart."""
+    for problems, which in _paper_and_beyond(metrics):
         complete, partial = [], []
         for planner, label in PLANNERS.items():
-            cells = {name: metrics[name][planner] for name in names if planner in metrics[name]}
+            cells = {
+                p.name: metrics[p.name][planner] for p in problems if planner in metrics[p.name]
+            }
             missing = [
-                f"{cell['problems'] - cell['problems_solved']} of {cell['problems']} on {name}"
+                f"{cell['problems_solved']} of {cell['problems']} on {name}"
                 for name, cell in cells.items()
                 if not _complete(cell)
             ]
             if cells and not missing:
                 complete.append(label)
             elif planner in GUIDED and missing:
-                partial.append(f"{label} leaves without a plan: {_join(missing)}.")
+                partial.append(f"{label} solves {_join(missing)}")
         if complete:
             yield f"All {which} are solved, with a verified path, by {_join(complete)}."
-        yield from partial
+        if partial:
+            yield f"Not all {which}: {'; '.join(partial)}."
+
+
+def _paper_and_beyond(metrics: Metrics) -> Iterator[tuple[list[Problem], str]]:
+    problems = compared(metrics)
+    yield [p for p in problems if p.name in paper.SCALABILITY], "the paper's problems"
+    yield [p for p in problems if p.name not in paper.SCALABILITY], "problems of 6 to 10 boxes"
 
 
 def _many_boxes(metrics: Metrics, timing: Metrics) -> Iterator[str]:
     """Problems beyond the paper's: effort of the relational policy, and what rivals solve."""
-    for problem in compared(metrics):
-        cells = metrics[problem.name]
-        if problem.name in paper.SCALABILITY or "relational" not in cells:
-            continue
-        seconds = search_time(timing[problem.name]["relational"])
-        rivals = [
-            f"{PLANNERS[planner]} solves {cells[planner]['problems_solved']}"
-            for planner in RIVALS
-            if planner in cells
-        ]
-        yield (
-            f"{problem.name} (K = {problem.k_min}): the relational policy, greedy, solves "
-            f"{cells['relational']['problems_solved']} of {cells['relational']['problems']} with "
-            f"{number(cells['relational']['policy_calls_mean'])} policy calls and "
-            f"{number(seconds, 2)} s on average without the path bound; {_join(rivals)}."
-        )
+    _, (problems, _) = _paper_and_beyond(metrics)
+    problems = [problem for problem in problems if "relational" in metrics[problem.name]]
+    if not problems:
+        return
+    cells = [metrics[problem.name] for problem in problems]
+    own = [cell["relational"] for cell in cells]
+    seconds = [search_time(timing[problem.name]["relational"]) for problem in problems]
+    solved = [
+        f"{PLANNERS[planner]} solves {_join([str(c[planner]['problems_solved']) for c in cells])}"
+        for planner in ("relational", *RIVALS)
+        if all(planner in cell for cell in cells)
+    ]
+    yield (
+        f"On {_join([problem.name for problem in problems])} "
+        f"(K = {_join([str(problem.k_min) for problem in problems])}), of "
+        f"{_join([str(cell['problems']) for cell in own])} problems, {', '.join(solved)}. "
+        f"Relational takes {_join([number(cell['policy_calls_mean']) for cell in own])} policy "
+        f"calls and {_join([number(value, 2) for value in seconds])} s on average without the "
+        "path bound."
+    )
 
 
 def _rivals(metrics: Metrics, timing: Metrics) -> Iterator[str]:
@@ -199,24 +210,24 @@ def _rivals(metrics: Metrics, timing: Metrics) -> Iterator[str]:
         name: {planner: search_time(cell) for planner, cell in row.items()}
         for name, row in timing.items()
     }
-    for quantity, figures, unit in (
-        ("generates fewer nodes", sizes, ""),
-        ("needs less time without the path bound", times, " s"),
+    for quantity, figures in (
+        ("generates fewer nodes", sizes),
+        ("needs less time without the path bound", times),
     ):
-        beaten = list(_beaten(metrics, figures, quantity, unit))
-        yield from beaten or [
-            f"No rival without a trained policy {quantity} than guided search on any problem that "
-            "it solves completely."
-        ]
+        beaten = list(_beaten(metrics, figures))
+        if beaten:
+            yield f"What {quantity} than guided search: {'; '.join(beaten)}."
+        else:
+            yield (
+                f"No rival without a trained policy {quantity} than guided search on any problem "
+                "that it solves completely."
+            )
 
 
-def _beaten(
-    metrics: Metrics, figures: Mapping[str, Mapping[str, float | None]], quantity: str, unit: str
-) -> Iterator[str]:
+def _beaten(metrics: Metrics, figures: Mapping[str, Mapping[str, float | None]]) -> Iterator[str]:
     """Per rival: where it beats the paper's guided search, and where every guided planner that
     solves the problem in all cases.
     """
-    decimals = 3 if unit else 1
     for rival in RIVALS:
         wins, best = [], []
         for problem in compared(metrics):
@@ -225,8 +236,7 @@ def _beaten(
             if theirs is None or not _complete(cells[rival]):
                 continue
             if "guided" in cells and ((ours := values["guided"]) is None or theirs < ours):
-                shown = f"{number(ours, decimals)}{unit}" if ours is not None else "no plan"
-                wins.append(f"{problem.name} ({number(theirs, decimals)}{unit} against {shown})")
+                wins.append(problem.name)
             others = [
                 value
                 for planner in GUIDED
@@ -236,11 +246,10 @@ def _beaten(
             ]
             if all(theirs < value for value in others):
                 best.append(problem.name)
-        if wins:
-            every = f", and than every guided planner on {_join(best)}" if best else ""
-            yield f"{PLANNERS[rival]} {quantity} than guided search on {_join(wins)}{every}."
-        elif best:
-            yield f"{PLANNERS[rival]} {quantity} than every guided planner on {_join(best)}."
+        parts = [f"Guided on {_join(wins)}"] if wins else []
+        parts += [f"every guided planner on {_join(best)}"] if best else []
+        if parts:
+            yield f"{PLANNERS[rival]} (than {', than '.join(parts)})"
 
 
 def _complete(cell: Metrics) -> bool:
