@@ -22,8 +22,11 @@ from guided_lgp.nlp.bounds import SceneBounds
 from guided_lgp.params import load_params
 from guided_lgp.paths import METRICS, PARAMS
 from guided_lgp.policy.samples import build_dataset
+from guided_lgp.report.table import Table
+from guided_lgp.report.tables import number
 from guided_lgp.scene import Scene, generate
 from guided_lgp.search.enumerate import enumerate_sequences as enumerate_scene
+from guided_lgp.search.tree import StateSpace
 
 Result = TypeVar("Result")
 
@@ -32,7 +35,7 @@ PAGE = Path("docs/scaling.md")
 BEGIN, END = "<!-- written by benchmarks/scaling.py -->", "<!-- end -->"
 SEED = 20_003
 """Of the scenes; no stage of the pipeline uses it."""
-CONFIGURATIONS, BOXES, DEPTHS = (4, 8, 16), (2, 3, 4), (2, 3, 4)
+CONFIGURATIONS, BOXES, DEPTHS = (4, 8, 16), (2, 3, 4, 5), (2, 3, 4)
 SCENES_PER_SIZE = 2
 DEPTH_BY_BOXES = 3
 FAR = 1_000_000
@@ -76,7 +79,7 @@ def configurations() -> list[dict[str, float]]:
 
 def boxes() -> list[dict[str, float]]:
     """All objectives of two goals, to a fixed depth, with more and more boxes."""
-    scenes = generate("c", SCENES_PER_SIZE, SEED, "boxes").scenes
+    scenes = generate("d", SCENES_PER_SIZE, SEED, "boxes").scenes
     return [
         {"boxes": count} | _enumerated([_with_boxes(s, count) for s in scenes], DEPTH_BY_BOXES)
         for count in BOXES
@@ -106,9 +109,12 @@ def _enumerated(scenes: Sequence[Scene], depth: int) -> dict[str, float]:
         elapsed, found = _timed(partial(enumerated, bounds, depth))
         seconds += elapsed
         verdicts += len(found.verdicts)
+    space = StateSpace(symbols, scenes[0].state)
+    space.explore()
     count = len(scenes)
     return {
         "objectives": len(objectives),
+        "states": len(space.states),
         "verdicts": verdicts / count,
         "enumeration_s": seconds / count,
         "logic_s": logic_s / count,
@@ -128,61 +134,57 @@ def extrapolated(largest: Mapping[str, float]) -> dict[str, float]:
 
 def tables(figures: Mapping[str, Any]) -> str:
     """The figures in Markdown."""
-    rows = figures["configurations"]
-    parts = [
-        _markdown("Configurations of setup a", _CONFIGURATIONS, rows, "configurations"),
-        _markdown("Boxes", _SIZES, figures["boxes"], "boxes"),
-        _markdown("Depth", _SIZES, figures["depths"], "depth"),
-    ]
-    far = extrapolated(rows[-1])
-    parts.append(
-        f"**{FAR:,} configurations**, in proportion: enumeration "
-        f"{far['enumeration_s'] / 3600:,.0f} core hours, "
-        f"{far['verdicts'] / 1e6:,.0f} million verdicts; "
-        f"scenes {far['scene_bytes'] / 1e9:.1f} GB; tables {far['table_bytes'] / 1e9:.0f} GB on "
-        f"disk and {far['memory_bytes'] / 1e9:.0f} GB in memory; "
-        f"{far['samples'] / 1e9:.1f}·10⁹ samples in {far['dataset_bytes'] / 1e9:.0f} GB, "
-        f"{far['build_s'] / 3600:,.0f} core hours to build.\n"
+    far = extrapolated(figures["configurations"][-1])
+    shown = (
+        _table("configurations", "Configurations of setup a", figures),
+        _table("boxes", f"Boxes, to depth {DEPTH_BY_BOXES}: means per configuration", figures),
+        _table("depths", "Depth in setup a: means per configuration", figures),
     )
-    return "\n".join(parts)
+    return "\n".join(
+        [
+            *(table.markdown() for table in shown),
+            f"**{FAR:,} configurations**, in proportion: enumeration "
+            f"{far['enumeration_s'] / 3600:,.0f} core hours, "
+            f"{far['verdicts'] / 1e6:,.0f} million verdicts; "
+            f"scenes {far['scene_bytes'] / 1e9:.1f} GB; tables {far['table_bytes'] / 1e9:.0f} GB "
+            f"on disk and {far['memory_bytes'] / 1e9:.0f} GB in memory; "
+            f"{far['samples'] / 1e9:.1f}·10⁹ samples in {far['dataset_bytes'] / 1e9:.0f} GB, "
+            f"{far['build_s'] / 3600:,.0f} core hours to build.\n",
+        ]
+    )
 
 
-_CONFIGURATIONS = {
-    "enumeration_s": ("enumeration (s)", 1.0),
-    "verdicts": ("verdicts", 1.0),
-    "table_bytes": ("tables (kB)", 1e-3),
-    "memory_bytes": ("in memory (kB)", 1e-3),
-    "scene_bytes": ("scenes (kB)", 1e-3),
-    "build_s": ("data set (s)", 1.0),
-    "samples": ("samples", 1.0),
-    "dataset_bytes": ("data set (kB)", 1e-3),
+_COLUMNS = {
+    "configurations": ("configurations", 1.0, 0),
+    "boxes": ("boxes", 1.0, 0),
+    "depth": ("depth", 1.0, 0),
+    "objectives": ("objectives", 1.0, 0),
+    "states": ("symbolic states", 1.0, 0),
+    "verdicts": ("verdicts", 1.0, 0),
+    "enumeration_s": ("enumeration (s)", 1.0, 2),
+    "logic_s": ("of it without geometry (s)", 1.0, 3),
+    "table_bytes": ("tables (kB)", 1e-3, 0),
+    "memory_bytes": ("in memory (kB)", 1e-3, 0),
+    "scene_bytes": ("scenes (kB)", 1e-3, 1),
+    "build_s": ("data set (s)", 1.0, 2),
+    "samples": ("samples", 1.0, 0),
+    "dataset_bytes": ("data set (kB)", 1e-3, 1),
 }
-_SIZES = {
-    "objectives": ("objectives", 1.0),
-    "verdicts": ("verdicts", 1.0),
-    "enumeration_s": ("enumeration (s)", 1.0),
-    "logic_s": ("of it without geometry (s)", 1.0),
-}
+"""Heading, unit and decimals of each figure."""
 
 
-def _markdown(
-    title: str,
-    columns: Mapping[str, tuple[str, float]],
-    rows: Sequence[Mapping[str, float]],
-    first: str,
-) -> str:
-    lines = [
-        f"| {title} | " + " | ".join(name for name, _ in columns.values()) + " |",
-        "|--:" * (1 + len(columns)) + "|",
-    ]
-    for row in rows:
-        cells = [_cell(row[key] * unit) for key, (_, unit) in columns.items()]
-        lines.append(f"| {row[first]} | " + " | ".join(cells) + " |")
-    return "\n".join(lines) + "\n"
-
-
-def _cell(value: float) -> str:
-    return f"{value:,.0f}" if value >= 100 else f"{value:.3g}"
+def _table(name: str, title: str, figures: Mapping[str, Any]) -> Table:
+    rows = figures[name]
+    columns = {key: _COLUMNS[key] for key in rows[0]}
+    return Table(
+        name,
+        title,
+        tuple(heading for heading, _, _ in columns.values()),
+        tuple(
+            tuple(number(row[key] * unit, decimals) for key, (_, unit, decimals) in columns.items())
+            for row in rows
+        ),
+    )
 
 
 def main() -> None:
