@@ -147,6 +147,7 @@ def _planners(metrics: Metrics) -> Table:
             "Means over the objectives solved in one configuration per problem, symbolic, policy "
             "and coarse time. A rival's figure is its time divided by the guided planner's: above "
             f"1, guided search is faster. {NONE}: nothing solved. (k/n): k of n solved.",
+            "Longer problems, on which rivals run into their limits: Table III.",
         ),
         (("", 4), *((f"{PLANNERS[rival]} takes, times", 2) for rival in rivals)),
     )
