@@ -17,7 +17,8 @@ _SHARED = {
     "print_blob": True,
 }
 settings.register_profile("ci", **_SHARED, derandomize=True, database=None)
-settings.register_profile("long", **_SHARED, max_examples=1000)
+_SLOWER = {"deadline": timedelta(minutes=5)}  # it runs beside other work
+settings.register_profile("long", **_SHARED | _SLOWER, max_examples=1000)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
 
 
