@@ -81,7 +81,8 @@ def compose(
             "Tree size and time against the number of actions",
             "Means over all problems of the same K, slightly shifted sideways to keep planners "
             "apart. Dashed: greedy; solid: best-first and planners without a policy. Open markers: "
-            "the paper's means. Crosses: stopped at a limit; dotted: that of the tree size.",
+            "the paper's means. White dots: means over the problems solved, not all are. Crosses: "
+            "stopped at a limit; dotted: that of the tree size.",
         ),
         Bullets(findings.scalability(inputs.scalability, inputs.timing)),
         tables["table_3_tree_size"],

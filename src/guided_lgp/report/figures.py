@@ -118,7 +118,7 @@ def headline(metrics: Metrics, timing: Metrics, limit: int) -> Figure:
     figure, axes = _subplots(1, 2, PAGE, 3.7)
     problems = compared(metrics)
     for axis, quantity in zip(axes[0], _quantities(metrics, timing)[:2], strict=True):
-        _against_k(axis, problems, quantity, spread=False)
+        _against_k(axis, problems, quantity, metrics, spread=False)
         axis.set_xlabel("Smallest number of actions $K$")
         axis.set_ylabel(quantity.title)
         _log_axes(axis, problems)
@@ -145,7 +145,7 @@ def scalability(metrics: Metrics, timing: Metrics, limit: int) -> Figure:
     )
     for row, quantity in zip(axes, quantities, strict=True):
         for axis, problems in zip(row, panels.values(), strict=True):
-            _against_k(axis, problems, quantity)
+            _against_k(axis, problems, quantity, metrics)
         row[0].set_ylabel(quantity.title)
     for axis, problems in zip(axes[0], panels.values(), strict=True):
         names = ", ".join(problem.name for problem in problems)
@@ -178,9 +178,16 @@ def _log_axes(axis: Axes, problems: Sequence[Problem]) -> None:
 
 
 def _against_k(
-    axis: Axes, problems: Sequence[Problem], quantity: Quantity, spread: bool = True
+    axis: Axes,
+    problems: Sequence[Problem],
+    quantity: Quantity,
+    metrics: Metrics,
+    spread: bool = True,
 ) -> None:
-    """Draw a quantity of all planners; without ``spread`` on a log axis of K, without bars."""
+    """Draw a quantity of all planners; without ``spread`` on a log axis of K, without bars.
+
+    A white dot marks the mean of a planner that leaves problems of that K unsolved.
+    """
     for rank, (planner, name) in enumerate(PLANNERS.items()):
         style: dict[str, Any] = PLANNER_STYLES[planner]
         # Side by side, so that equal figures do not hide each other.
@@ -202,6 +209,17 @@ def _against_k(
             # On a log axis an error bar cannot reach zero.
             bars = (np.minimum(errors, 0.9 * values), errors) if spread else None
             axis.errorbar(lengths, values, bars, elinewidth=0.7, capsize=1.5, label=name, **style)
+            partial = [
+                any(
+                    metrics[p.name][planner]["problems_solved"]
+                    < metrics[p.name][planner]["problems"]
+                    for p in problems
+                    if p.k_min == k and planner in metrics[p.name]
+                )
+                for k in known
+            ]
+            dots = np.column_stack([lengths, values])[partial]
+            axis.plot(*dots.T, "o", color="white", markersize=2.2, zorder=5)
         printed = [
             (p.k_min * (1 + 0.006 * side), paper.SCALABILITY[p.name][planner][quantity.mean])
             for p in problems
