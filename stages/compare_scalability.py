@@ -2,4 +2,5 @@
 
 from guided_lgp.cli import stage_main
 
-stage_main("compare_scalability")
+if __name__ == "__main__":  # worker processes of Dask import this file
+    stage_main("compare_scalability")

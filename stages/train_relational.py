@@ -2,4 +2,5 @@
 
 from guided_lgp.cli import stage_main
 
-stage_main("train_relational")
+if __name__ == "__main__":  # worker processes of Dask import this file
+    stage_main("train_relational")
