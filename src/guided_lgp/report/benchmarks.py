@@ -8,7 +8,7 @@ from guided_lgp.report import tables
 from guided_lgp.report.inputs import Metrics
 from guided_lgp.report.style import NETWORKS, PLANNERS, RIVALS
 from guided_lgp.report.table import Table
-from guided_lgp.report.tables import NONE, number, percent, search_time
+from guided_lgp.report.tables import NONE, number, percent, search_time, unless_all_solved
 
 PAGE = Path("docs/benchmarks.md")
 
@@ -132,10 +132,15 @@ def _planners(metrics: Metrics) -> Table:
             continue
         bases = {planner: search_time(cells[planner]) for planner in _GUIDED}
         row = [tables.label(problem), str(problem.k_min)]
-        row += [f"{number(bases[planner], 3)}{_partial(cells[planner])}" for planner in _GUIDED]
+        row += [
+            f"{number(bases[planner], 3)}{unless_all_solved(cells[planner])}" for planner in _GUIDED
+        ]
         for rival in rivals:
             theirs = search_time(cells[rival])
-            row += [_ratio(theirs, bases[planner]) + _partial(cells[rival]) for planner in _GUIDED]
+            row += [
+                _ratio(theirs, bases[planner]) + unless_all_solved(cells[rival])
+                for planner in _GUIDED
+            ]
         rows.append(tuple(row))
     names = [PLANNERS[planner] for planner in _GUIDED]
     return Table(
@@ -151,11 +156,6 @@ def _planners(metrics: Metrics) -> Table:
         ),
         (("", 4), *((f"{PLANNERS[rival]} takes, times", 2) for rival in rivals)),
     )
-
-
-def _partial(cell: Metrics) -> str:
-    solved, n = cell["problems_solved"], cell["problems"]
-    return "" if solved == n else f" ({solved}/{n})"
 
 
 def _ratio(theirs: float | None, ours: float | None) -> str:

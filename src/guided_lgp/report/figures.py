@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from guided_lgp.documents import written_whole
 from guided_lgp.experiments.problems import Problem
 from guided_lgp.report import paper
-from guided_lgp.report.inputs import Metrics, compared
+from guided_lgp.report.inputs import Metrics, all_solved, compared
 from guided_lgp.report.style import (
     PLANNER_STYLES,
     PLANNERS,
@@ -211,8 +211,7 @@ def _against_k(
             axis.errorbar(lengths, values, bars, elinewidth=0.7, capsize=1.5, label=name, **style)
             partial = [
                 any(
-                    metrics[p.name][planner]["problems_solved"]
-                    < metrics[p.name][planner]["problems"]
+                    not all_solved(metrics[p.name][planner])
                     for p in problems
                     if p.k_min == k and planner in metrics[p.name]
                 )

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from guided_lgp.experiments.problems import Problem
 from guided_lgp.report import paper
 from guided_lgp.report.analysis import NEW, RENAMED, SEEN
-from guided_lgp.report.inputs import Metrics, compared
+from guided_lgp.report.inputs import Metrics, all_solved, compared
 from guided_lgp.report.style import GUIDED, PLANNERS, POLICIES, RIVALS, VARIANTS
 from guided_lgp.report.tables import number, percent, search_time
 
@@ -149,7 +149,11 @@ def _against_the_paper(metrics: Metrics) -> Iterator[str]:
 
 def _solved(metrics: Metrics) -> Iterator[str]:
     """Who solves every problem, and what the guided planners solve, the paper's problems apart."""
-    for problems, which in _paper_and_beyond(metrics):
+    printed, beyond = _printed_and_beyond(metrics)
+    for problems, which in (
+        (printed, "the paper's problems"),
+        (beyond, "problems of 6 to 10 boxes"),
+    ):
         complete, partial = [], []
         for planner, label in PLANNERS.items():
             cells = {
@@ -158,7 +162,7 @@ def _solved(metrics: Metrics) -> Iterator[str]:
             missing = [
                 f"{cell['problems_solved']} of {cell['problems']} on {name}"
                 for name, cell in cells.items()
-                if not _complete(cell)
+                if not all_solved(cell)
             ]
             if cells and not missing:
                 complete.append(label)
@@ -170,15 +174,18 @@ def _solved(metrics: Metrics) -> Iterator[str]:
             yield f"Not all {which}: {'; '.join(partial)}."
 
 
-def _paper_and_beyond(metrics: Metrics) -> Iterator[tuple[list[Problem], str]]:
+def _printed_and_beyond(metrics: Metrics) -> tuple[list[Problem], list[Problem]]:
+    """The problems of which the paper prints figures, and the others."""
     problems = compared(metrics)
-    yield [p for p in problems if p.name in paper.SCALABILITY], "the paper's problems"
-    yield [p for p in problems if p.name not in paper.SCALABILITY], "problems of 6 to 10 boxes"
+    return (
+        [problem for problem in problems if problem.name in paper.SCALABILITY],
+        [problem for problem in problems if problem.name not in paper.SCALABILITY],
+    )
 
 
 def _many_boxes(metrics: Metrics, timing: Metrics) -> Iterator[str]:
     """Problems beyond the paper's: effort of the relational policy, and what rivals solve."""
-    _, (problems, _) = _paper_and_beyond(metrics)
+    _, problems = _printed_and_beyond(metrics)
     problems = [problem for problem in problems if "relational" in metrics[problem.name]]
     if not problems:
         return
@@ -233,7 +240,7 @@ def _beaten(metrics: Metrics, figures: Mapping[str, Mapping[str, float | None]])
         for problem in compared(metrics):
             cells, values = metrics[problem.name], figures[problem.name]
             theirs = values.get(rival)
-            if theirs is None or not _complete(cells[rival]):
+            if theirs is None or not all_solved(cells[rival]):
                 continue
             if "guided" in cells and ((ours := values["guided"]) is None or theirs < ours):
                 wins.append(problem.name)
@@ -241,7 +248,7 @@ def _beaten(metrics: Metrics, figures: Mapping[str, Mapping[str, float | None]])
                 value
                 for planner in GUIDED
                 if planner in cells
-                and _complete(cells[planner])
+                and all_solved(cells[planner])
                 and (value := values[planner]) is not None
             ]
             if all(theirs < value for value in others):
@@ -250,10 +257,6 @@ def _beaten(metrics: Metrics, figures: Mapping[str, Mapping[str, float | None]])
         parts += [f"every guided planner on {_join(best)}"] if best else []
         if parts:
             yield f"{PLANNERS[rival]} (than {', than '.join(parts)})"
-
-
-def _complete(cell: Metrics) -> bool:
-    return bool(cell["problems_solved"] == cell["problems"])
 
 
 def _join(parts: list[str]) -> str:

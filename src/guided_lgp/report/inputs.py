@@ -144,6 +144,11 @@ def compared(scalability: Metrics) -> list[Problem]:
     return [problem for problem in PROBLEMS if problem.name in scalability]
 
 
+def all_solved(cell: Metrics) -> bool:
+    """Whether a planner, in a cell of the metrics, solved every problem that it was given."""
+    return bool(cell["problems_solved"] == cell["problems"])
+
+
 def _setups(scalability: Metrics) -> list[str]:
     return list(dict.fromkeys(problem.setup for problem in compared(scalability)))
 

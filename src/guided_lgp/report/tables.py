@@ -11,7 +11,7 @@ import pandas as pd
 from guided_lgp.experiments.problems import Problem
 from guided_lgp.report import paper
 from guided_lgp.report.analysis import NEW, RENAMED, SEEN
-from guided_lgp.report.inputs import Metrics, compared
+from guided_lgp.report.inputs import Metrics, all_solved, compared
 from guided_lgp.report.style import NETWORKS, PLANNERS, POLICIES, VARIANTS
 from guided_lgp.report.table import Table
 
@@ -44,6 +44,11 @@ def spread(mean: float | None, std: float | None) -> str:
         return NONE
     decimals = 2 if mean < 10 else 1 if mean < 1000 else 0
     return f"{number(mean, decimals)} ± {number(std, decimals)}"
+
+
+def unless_all_solved(cell: Metrics) -> str:
+    """What follows a mean over a part of the problems: (k/n) for k of n solved."""
+    return "" if all_solved(cell) else f" ({cell['problems_solved']}/{cell['problems']})"
 
 
 def generalization(metrics: Metrics, calls: Mapping[str, float]) -> Table:
@@ -239,12 +244,10 @@ def _comparison(quantity: str, metrics: Metrics, figures: Metrics) -> Table:
                 cells.append("")
                 continue
             shown = figures[problem.name][planner]
-            solved, n = cell["problems_solved"], cell["problems"]
-            partial = "" if solved == n else f" ({solved}/{n})"
-            cells.append(spread(shown[mean], shown[std]) + partial)
+            cells.append(spread(shown[mean], shown[std]) + unless_all_solved(cell))
             records.append(
                 _record(problem, planner, "ours", shown[mean], shown[std])
-                | {"n": n, "solved": solved}
+                | {"n": cell["problems"], "solved": cell["problems_solved"]}
             )
         rows.append((PLANNERS[planner], "ours", *cells))
     groups: dict[str, int] = {}
