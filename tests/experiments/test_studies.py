@@ -16,7 +16,7 @@ from guided_lgp.experiments import feasibility, studies
 from guided_lgp.experiments.enumerate_sequences import shortest_table, verdict_table
 from guided_lgp.experiments.files import write_table
 from guided_lgp.logic import one_goal_objectives, satisfied, two_goal_objectives
-from guided_lgp.params import load_params
+from guided_lgp.params import Variant, load_params
 from guided_lgp.report.studies import render
 from guided_lgp.scene import generate
 from guided_lgp.search.enumerate import enumerate_sequences
@@ -48,7 +48,7 @@ RELATIONAL = {
     "batch": 512,
     "lr": 1e-2,
 }
-SMALL = {"policy": "paper", "seeds": 1, "configurations": 2, "objectives": 40}
+SMALL = {"title": "title", "policy": "paper", "configurations": 2}
 STUDY: dict[str, Any] = {
     "seeds": [4, 11],
     "limits": {
@@ -58,15 +58,15 @@ STUDY: dict[str, Any] = {
         "max_paths": 2,
         "max_sequences": 1000,
     },
-    "training": {"paper": NETWORKS, "improved": NETWORKS, "relational": RELATIONAL},
     "cases": {
-        "paper": {**SMALL, "title": "paper", "seeds": 2},
-        "relational": {**SMALL, "title": "relational", "policy": "relational"},
+        "paper": SMALL,
+        "relational": {**SMALL, "policy": "relational", "objectives": 10},
         "shuffled": {
             **SMALL,
-            "title": "shuffled",
             "shuffled": True,
             "split": "configuration",
+            "patience": 1,
+            "dropout": 0.0,
         },
     },
     "tables": {
@@ -87,6 +87,7 @@ def root(tmp_path: Path) -> Path:
     """A folder with parameters."""
     pipeline = yaml.safe_load((ROOT / "params.yaml").read_text())
     pipeline["parallel"]["workers"] = 1
+    pipeline |= {"train_policy": NETWORKS, "train_relational": RELATIONAL}
     (tmp_path / "params.yaml").write_text(yaml.safe_dump(pipeline))
     write(tmp_path, STUDY)
     return tmp_path
@@ -119,15 +120,22 @@ def test_train_evaluate_render(root: Path, monkeypatch: pytest.MonkeyPatch) -> N
     enumerate_all(root, "test", 1)
     for case in STUDY["cases"]:
         studies.train(root, case)
+    dropouts = {
+        case: json.loads((root / f"data/studies/{case}/11/grasp.json").read_text())["training"][
+            "dropout"
+        ]
+        for case in ("paper", "shuffled")
+    }
+    assert dropouts == {"paper": 0.1, "shuffled": 0.0}
     for table in STUDY["tables"]:
         studies.evaluate(root, table)
     spread = json.loads((root / "reports/studies/spread.json").read_text())
     assert list(spread) == ["paper", "relational"]
-    for case, planners in spread.items():
+    for planners in spread.values():
         assert list(planners) == ["default", "adaptation", "best_first"]
         for figures in planners.values():
             for values in figures.values():
-                assert len(values["n"]) == STUDY["cases"][case]["seeds"]
+                assert len(values["n"]) == len(STUDY["seeds"])
                 outcomes = [values[name] for name in studies.OUTCOMES]
                 assert [sum(run) for run in zip(*outcomes, strict=True)] == pytest.approx(
                     [1.0] * len(values["n"])
@@ -160,13 +168,23 @@ def test_train_evaluate_render(root: Path, monkeypatch: pytest.MonkeyPatch) -> N
     assert (root / "reports/studies/tables/floor.tex").is_file()
 
 
+def with_case(**changes: Any) -> dict[str, Any]:
+    """The cases, and one more."""
+    return {"cases": STUDY["cases"] | {"more": SMALL | changes}}
+
+
 @pytest.mark.parametrize(
     ("change", "fault"),
     [
         ({"tables": {"x": {"title": "x", "cases": ["none"]}}}, "tables.x.cases: unknown case"),
-        ({"seeds": [4]}, "cases.paper.seeds: is 2 .*up to 1"),
-        ({"cases": {"a": {**SMALL, "titel": "x"}}}, "cases.a.title: missing"),
-        ({"cases": {"a": {**SMALL, "title": "a", "of": 1}}}, "cases.a.of: unknown key .*policy"),
+        ({"seeds": []}, "seeds: .*at least 1"),
+        ({"cases": {"a": {"policy": "paper"}}}, "cases.a.title: missing"),
+        ({"cases": {"a": {**SMALL, "of": 1}}}, "cases.a.of: unknown key .*policy"),
+        (with_case(configurations=53), "cases.more.configurations: is 53 .*1 to 52"),
+        (
+            with_case(policy="relational", dropout=0.1),
+            "cases.more.dropout: is given .*none for the relational policy",
+        ),
         ({"other": 1}, "other: unknown key .*seeds, limits"),
     ],
 )
@@ -188,24 +206,13 @@ def test_the_declared_studies() -> None:
     study, params = studies.load_study(ROOT)
     pipeline = load_params(ROOT / "params.yaml")
     assert params == pipeline
+    assert len(study.seeds) >= 3
     for name in ("paper", "improved", "relational"):
         case = study.cases[name]
-        assert case.seeds >= 3
-        assert case.training == "full"
-        assert case.configurations == pipeline.generate_scenes.training_configurations
-        assert case.objectives == pipeline.build_dataset.training_objectives
+        differing = case.model_dump(exclude_defaults=True, exclude={"title", "policy", "variant"})
+        assert not differing
+    assert study.cases["paper"].variant == study.cases["relational"].variant == Variant()
     assert study.cases["improved"].variant == pipeline.build_dataset.improved
-    for network in ("instruction", "grasp", "place"):
-        for ours, theirs in (
-            (study.training.paper, pipeline.train_policy),
-            (study.training.improved, pipeline.train_improved),
-        ):
-            own, other = getattr(ours, network), getattr(theirs, network)
-            assert (own.layers, own.nodes, own.dropout) == (
-                other.layers,
-                other.nodes,
-                other.dropout,
-            )
     stages = yaml.safe_load((ROOT / "studies/dvc.yaml").read_text())["stages"]
     figures = {name for out in stages["feasibility"]["outs"] for name in out}
     assert figures == {f"reports/studies/feasibility{part}.json" for part in ("", "_timing")}

@@ -1,10 +1,10 @@
 """The studies beside the pipeline: spread over draws, ablations, data efficiency, shuffled labels.
 
-A case is a policy that differs in something from the paper's or from the improved one; it is
-trained once per seed, which draws the training objectives and seeds the training. Every policy then
-solves all problems of the generalization test, up to the coarse bound: a sequence that has one
-counts as a plan, the path bound is not asked. A verdict is computed once per configuration and
-shared by all policies.
+A case is a policy of the pipeline, or one that differs from it in something; it is trained once per
+seed, which draws the training objectives and seeds the training. Every policy then solves all
+problems of the generalization test, up to the coarse bound: a sequence that has one counts as a
+plan, the path bound is not asked. A verdict is computed once per configuration and shared by all
+policies.
 """
 
 import logging
@@ -47,11 +47,12 @@ from guided_lgp.params import (
 )
 from guided_lgp.paths import PARAMS, REPORTS, SCENES, SEQUENCES
 from guided_lgp.policy.dataset import Dataset
+from guided_lgp.policy.encoding import CHAINS
 from guided_lgp.policy.inference import load_policy
 from guided_lgp.policy.relational.train import train_split
 from guided_lgp.policy.samples import build_dataset
 from guided_lgp.policy.split import training_objectives
-from guided_lgp.policy.train import train_models
+from guided_lgp.policy.train import train_model
 from guided_lgp.scene import Scene, load_scenes
 from guided_lgp.search import best_first, guided
 from guided_lgp.search.result import SearchResult
@@ -79,28 +80,20 @@ class Case(Section):
     title: str
     policy: Literal["paper", "improved", "relational"]
     """Whose training: the paper's networks (Table IV), the improved variant or the relational."""
-    training: Literal["short", "full"] = "short"
-    """The shorter training of ``studies/params.yaml``, or the pipeline's own."""
+    patience: Count | None = None
+    """Of early stopping, if not the policy's own."""
+    dropout: Annotated[float, Field(strict=True, ge=0, lt=1)] | None = None
+    """Of all three networks, if not their own; the relational policy has none."""
     variant: Variant = Variant()
     """How samples are made and encoded."""
-    seeds: Annotated[int, Field(strict=True, ge=1)]
-    """How many of the seeds it is trained with."""
-    configurations: Annotated[int, Field(strict=True, ge=1)]
-    """How many training configurations, the first ones."""
-    objectives: Annotated[int, Field(strict=True, ge=1, le=72)]
-    """How many training objectives."""
+    configurations: Count | None = None
+    """How many training configurations, the first ones, if not all."""
+    objectives: Annotated[int, Field(strict=True, ge=1, le=72)] | None = None
+    """How many training objectives, if not as many as in the pipeline."""
     split: Literal["random", "configuration"] = "random"
     """How samples for early stopping are chosen."""
     shuffled: Annotated[bool, Field(strict=True)] = False
     """Whether the actions of all samples are exchanged at random."""
-
-
-class Training(Section):
-    """Training of the policies; cheaper than the pipeline's where that costs nothing."""
-
-    paper: TrainPolicy
-    improved: TrainPolicy
-    relational: TrainRelational
 
 
 class FeasibilityStudy(Section):
@@ -125,7 +118,6 @@ class StudyParams(Section):
 
     seeds: Annotated[tuple[Seed, ...], Field(min_length=1)]
     limits: SearchLimits
-    training: Training
     cases: dict[str, Case]
     tables: dict[str, StudyTable]
     feasibility: FeasibilityStudy
@@ -136,30 +128,33 @@ def load_study(root: Path) -> tuple[StudyParams, Params]:
 
     Raises:
         InputError: a file is missing or damaged; a table names a case that does not exist, or a
-            case wants more seeds than there are.
+            case wants dropout for the relational policy or more configurations than there are.
     """
     path = root / STUDIES / "params.yaml"
-    study = read_params(path, StudyParams)
+    study, params = read_params(path, StudyParams), load_params(root / PARAMS)
     for table, content in study.tables.items():
         for name in content.cases:
             if name not in study.cases:
                 where = f"{path}: tables.{table}.cases"
                 raise InputError(where, f"unknown case {name!r}", ", ".join(study.cases))
     for name, case in study.cases.items():
-        if case.seeds > len(study.seeds):
-            raise InputError(
-                f"{path}: cases.{name}.seeds", f"is {case.seeds}", f"up to {len(study.seeds)}"
-            )
-    return study, load_params(root / PARAMS)
+        where, most = f"{path}: cases.{name}", params.generate_scenes.training_configurations
+        if case.policy == "relational" and case.dropout is not None:
+            raise InputError(f"{where}.dropout", "is given", "none for the relational policy")
+        if case.configurations is not None and case.configurations > most:
+            raise InputError(f"{where}.configurations", f"is {case.configurations}", f"1 to {most}")
+    return study, params
 
 
 @dataclass(frozen=True)
 class _Training:
-    """One policy to train."""
+    """One network to train."""
 
     case: Case
     seed: int
+    network: str
     settings: TrainPolicy | TrainRelational
+    objectives: int
     slack: int
     root: Path
     directory: Path
@@ -175,29 +170,45 @@ def train(root: Path, name: str) -> None:
     if name not in study.cases:
         raise InputError(f"case {name!r}", "is unknown", ", ".join(study.cases))
     case = study.cases[name]
-    settings = _settings(case, study, params)
+    settings = _settings(case, params)
+    networks = ["relational"] if isinstance(settings, TrainRelational) else list(CHAINS)
     tasks = [
         _Training(
             case=case,
             seed=seed,
+            network=network,
             settings=settings.model_copy(update={"seed": seed}),
+            objectives=_objectives(case, params),
             slack=params.enumerate_sequences.slack,
             root=root,
             directory=root / POLICIES / name / str(seed),
         )
-        for seed in study.seeds[: case.seeds]
+        for seed in study.seeds
+        for network in networks
     ]
     parallel.run(_train, tasks, params.parallel, f"training {name}")
 
 
-def _settings(case: Case, study: StudyParams, params: Params) -> TrainPolicy | TrainRelational:
+def _objectives(case: Case, params: Params) -> int:
+    return case.objectives or params.build_dataset.training_objectives
+
+
+def _settings(case: Case, params: Params) -> TrainPolicy | TrainRelational:
     stages: dict[str, TrainPolicy | TrainRelational] = {
         "paper": params.train_policy,
         "improved": params.train_improved,
         "relational": params.train_relational,
     }
-    short: TrainPolicy | TrainRelational = getattr(study.training, case.policy)
-    return stages[case.policy] if case.training == "full" else short
+    settings = stages[case.policy]
+    if case.patience is not None:
+        settings = settings.model_copy(update={"patience": case.patience})
+    if case.dropout is not None:
+        networks = {
+            network: getattr(settings, network).model_copy(update={"dropout": case.dropout})
+            for network in CHAINS
+        }
+        settings = settings.model_copy(update=networks)
+    return settings
 
 
 def _train(task: _Training) -> None:
@@ -205,8 +216,8 @@ def _train(task: _Training) -> None:
     if isinstance(task.settings, TrainRelational):
         train_split(dataset, task.settings, task.case.split).save(task.directory)
     else:
-        for model in train_models(dataset, task.settings, task.case.split).values():
-            model.save(task.directory)
+        model = train_model(task.network, dataset, task.settings, task.case.split)
+        model.save(task.directory)
 
 
 def _dataset(task: _Training) -> Dataset:
@@ -215,7 +226,7 @@ def _dataset(task: _Training) -> Dataset:
         scenes[: task.case.configurations],
         task.root / SEQUENCES / "training.parquet",
         task.root / SEQUENCES / "training_shortest.parquet",
-        training_objectives(scenes[0].symbols, task.case.objectives, task.seed),
+        training_objectives(scenes[0].symbols, task.objectives, task.seed),
         task.slack,
         task.case.variant,
         task.seed,
@@ -249,8 +260,8 @@ class _Evaluation:
     shortest: Mapping[str, int | None]
     """Shortest feasible length by objective."""
     study: StudyParams
+    params: Params
     table: str
-    bounds: BoundsParams
     root: Path
 
 
@@ -267,8 +278,7 @@ def evaluate(root: Path, table: str) -> None:
     scenes = load_scenes(root / SCENES / "test.json").scenes
     lengths = shortest_lengths(root, scenes)
     tasks = [
-        _Evaluation(scene, lengths[scene.name], study, table, params.bounds, root)
-        for scene in scenes
+        _Evaluation(scene, lengths[scene.name], study, params, table, root) for scene in scenes
     ]
     parts = parallel.run(_evaluate, tasks, params.parallel, "studies")
     rows: dict[tuple[str, int, str], list[Row]] = {run: [] for run in _runs(study, table)}
@@ -315,13 +325,13 @@ def _by_subset(runs: Sequence[Sequence[Row]]) -> dict[str, dict[str, list[float 
 
 def _evaluate(task: _Evaluation) -> list[Row]:
     symbols = task.scene.symbols
-    bounds = CoarseBounds(task.scene, task.bounds)
+    bounds = CoarseBounds(task.scene, task.params.bounds)
     rows = []
     for name, seed, planner in _runs(task.study, task.table):
         case = task.study.cases[name]
         kind = "relational" if case.policy == "relational" else "paper"  # the kind of files
         policy = load_policy(task.root / POLICIES / name / str(seed), kind)
-        seen = set(training_objectives(symbols, case.objectives, seed))
+        seen = set(training_objectives(symbols, _objectives(case, task.params), seed))
         for objective in problems(task.scene):
             result = PLANNERS[planner](
                 task.scene, objective, symbols, bounds, policy, task.study.limits
@@ -338,7 +348,7 @@ def _evaluate(task: _Evaluation) -> list[Row]:
 
 def _runs(study: StudyParams, table: str) -> Iterator[tuple[str, int, str]]:
     for name in study.tables[table].cases:
-        for seed in study.seeds[: study.cases[name].seeds]:
+        for seed in study.seeds:
             for planner in PLANNERS:
                 yield name, seed, planner
 

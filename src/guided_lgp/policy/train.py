@@ -111,10 +111,11 @@ def train_network(
     )
 
 
-def train_models(dataset: Dataset, settings: TrainPolicy, split: str) -> dict[str, Model]:
-    """All networks, one after another in this process; for studies, which train many policies.
+def train_model(network: str, dataset: Dataset, settings: TrainPolicy, split: str) -> Model:
+    """One network in this process; for studies, which train many side by side.
 
     Args:
+        network: ``instruction``, ``grasp`` or ``place``.
         dataset: the training samples.
         settings: of training.
         split: the one of :data:`SPLITS` that decides about the weights.
@@ -122,12 +123,8 @@ def train_models(dataset: Dataset, settings: TrainPolicy, split: str) -> dict[st
     Raises:
         InputError: too few samples to split, or a training that diverges at once.
     """
-    models = {}
-    for network in CHAINS:
-        tasks = _tasks(network, dataset, settings, split)
-        fits = {task.sub_policy: _train(task) for task in tasks}
-        models[network] = _model(network, dataset, settings, fits)
-    return models
+    tasks = _tasks(network, dataset, settings, split)
+    return _model(network, dataset, settings, {task.sub_policy: _train(task) for task in tasks})
 
 
 def _tasks(network: str, dataset: Dataset, settings: TrainPolicy, split: str) -> list[_Task]:

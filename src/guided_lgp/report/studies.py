@@ -50,13 +50,12 @@ def _table(name: str, content: StudyTable, figures: Figures, study: StudyParams)
     rows, records = [], []
     for case in content.cases:
         title = study.cases[case].title
-        cells = [title, str(study.cases[case].seeds)]
+        cells = [title, str(len(figures[case]["default"]["all"]["n"]))]
         for planner in PLANNERS:
             subsets = figures[case][planner]
             cells += [_cell(subsets[subset][outcome]) for outcome, subset in SHOWN]
         rows.append(tuple(cells))
         records += _records(case, title, figures[case])
-    own = study.training.paper
     return Table(
         name=f"study_{name}",
         title=content.title,
@@ -68,11 +67,6 @@ def _table(name: str, content: StudyTable, figures: Figures, study: StudyParams)
             "and the 87 objectives; mean ± standard deviation over runs, each with its own draw of "
             "the training objectives and its own seed. No plan: of all objectives.",
             "A sequence with a coarse bound counts as a plan; the path bound is not asked.",
-            "Trained as in the pipeline."
-            if all(study.cases[case].training == "full" for case in content.cases)
-            else f"Training differs from Table IV in the batches ({own.place.batch}), the learning "
-            f"rate ({own.place.lr:g}) and the epochs (at most {own.place.epochs}, patience "
-            f"{own.patience}).",
         ),
         records=records,
     )
