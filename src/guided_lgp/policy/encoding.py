@@ -154,8 +154,7 @@ class Encoding:
         goals name, the boxes that are held, and the others as declared, until they are full. A
         symbol whose place in the declaration is a slot keeps that slot, so that nothing moves
         in a problem that fits; unless boxes that are named come first. Of more boxes than slots
-        they always do, lower ones first: the paper leaves the order open, and with the declared
-        one the towers of c.2 take trees twice as large.
+        they always do, lower ones first; the paper leaves the order open.
         """
         goals = objective
         if len(goals) > self.goals or len(_boxes(goals, symbols)) > self.boxes:
