@@ -28,9 +28,12 @@ repro: setup
 	-guided-lgp mlflow sync
 	python -m guided_lgp.report.readme
 
-# Spread over draws, ablations, data efficiency: policies of their own, on the data of `repro`.
+# Spread over draws, ablations, data efficiency: policies of their own, on the data of `repro`. The
+# report shows the spread but cannot depend on it, or `dvc repro` would run the studies.
 study: setup
 	dvc repro studies/dvc.yaml
+	dvc repro -f -s render_reports
+	python -m guided_lgp.report.readme
 
 test: lint
 	pytest -n auto --dist loadfile
