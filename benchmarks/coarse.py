@@ -17,13 +17,13 @@ from typing import Any
 import numpy as np
 
 from guided_lgp import parallel
+from guided_lgp.bounds.coarse import CoarseBound
+from guided_lgp.bounds.coarse.formulation import Formulator, Margins, SceneGeometry
+from guided_lgp.bounds.coarse.ipopt import Ipopt
+from guided_lgp.bounds.coarse.solver import Program, Settings, Solution, default_solver
+from guided_lgp.bounds.coarse.starts import Starts
+from guided_lgp.bounds.results import Array, CoarseResult
 from guided_lgp.logic import Skeleton, applicable_actions, successor
-from guided_lgp.nlp.coarse import CoarseBound
-from guided_lgp.nlp.coarse.formulation import Formulator, Margins, SceneGeometry
-from guided_lgp.nlp.coarse.ipopt import Ipopt
-from guided_lgp.nlp.coarse.solver import Program, Settings, Solution, default_solver
-from guided_lgp.nlp.coarse.starts import Starts
-from guided_lgp.nlp.results import Array, CoarseResult
 from guided_lgp.params import load_params
 from guided_lgp.paths import PARAMS
 from guided_lgp.scene import Scene

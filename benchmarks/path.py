@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 
 from guided_lgp import parallel
+from guided_lgp.bounds.coarse import CoarseBound
+from guided_lgp.bounds.execution import execute
+from guided_lgp.bounds.path import PathBound
+from guided_lgp.bounds.results import CoarseResult
 from guided_lgp.logic import Goal, Skeleton, State, applicable_actions, successor
-from guided_lgp.nlp.coarse import CoarseBound
-from guided_lgp.nlp.path import PathBound
-from guided_lgp.nlp.physics import execute
-from guided_lgp.nlp.results import CoarseResult
 from guided_lgp.params import load_params
 from guided_lgp.paths import PARAMS
 from guided_lgp.scene import Scene

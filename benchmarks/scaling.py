@@ -15,10 +15,10 @@ from typing import Any, TypeVar
 
 import pyarrow.parquet as pq
 
+from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.documents import write_json, written_whole
 from guided_lgp.experiments import enumerate_sequences
 from guided_lgp.logic import Objective, two_goal_objectives
-from guided_lgp.nlp.bounds import SceneBounds
 from guided_lgp.params import load_params
 from guided_lgp.paths import METRICS, PARAMS
 from guided_lgp.policy.samples import build_dataset

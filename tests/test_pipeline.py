@@ -22,7 +22,7 @@ INFRASTRUCTURE = {"guided_lgp"} | {
     f"guided_lgp.{name}" for name in ("documents", "errors", "parallel", "params", "paths")
 }
 """Modules that do not determine a stage's results: fan-out, messages, places."""
-UNUSED = {"enumerate_sequences": {"guided_lgp.nlp.path"}}
+UNUSED = {"enumerate_sequences": {"guided_lgp.bounds.path"}}
 """What a stage imports without calling it: the enumeration asks for coarse verdicts only."""
 
 

@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 from guided_lgp import cli, load_scene, plan
+from guided_lgp.bounds.results import CoarseResult, Failure, PathResult
 from guided_lgp.errors import InputError
 from guided_lgp.explanation import ObservedBounds, Obstacle
 from guided_lgp.logic import Action, Skeleton, State, parse_objective
 from guided_lgp.logic.domain import parse_skeleton
-from guided_lgp.nlp.results import CoarseResult, Failure, PathResult
 from guided_lgp.planning import PlanningResult
 from guided_lgp.policy.inference import POLICIES
 from guided_lgp.search.result import Times

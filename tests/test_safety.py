@@ -18,12 +18,12 @@ import psutil
 import pytest
 
 from guided_lgp import cli, parallel, tracking
+from guided_lgp.bounds.results import Trajectory
 from guided_lgp.errors import InputError
-from guided_lgp.nlp.results import Trajectory
 from guided_lgp.policy.dataset import load_dataset
-from guided_lgp.report.replay import replay_html
-from guided_lgp.report.viewer import Viewer
 from guided_lgp.scene import Scene, load_scene, pr2
+from guided_lgp.view.replay import replay_html
+from guided_lgp.view.viewer import Viewer
 
 ROOT = Path(__file__).parents[1]
 SOURCES = sorted(
@@ -128,7 +128,7 @@ WATCHED = """
 import sys
 from pathlib import Path
 from guided_lgp import planning
-from guided_lgp.nlp.bounds import SceneBounds
+from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.params import load_params
 from guided_lgp.policy.inference import load_policy
 from guided_lgp.scene import load_scene

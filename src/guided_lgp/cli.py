@@ -261,17 +261,17 @@ def plan(
         raise typer.Exit(1)
     physics = None
     if execute:
-        from guided_lgp.nlp.physics import execute as simulate
+        from guided_lgp.bounds.execution import execute as simulate
 
         with _spinner("executing"):
             physics = asdict(simulate(start, objective, path.skeleton, path.trajectory))
         summary["physics"] = physics
     if out:
-        from guided_lgp.nlp.plan_file import write_plan
+        from guided_lgp.bounds.plan_file import write_plan
 
         write_plan(out, start, objective, path, statistics, physics)
     if html:
-        from guided_lgp.report.replay import replay_html
+        from guided_lgp.view.replay import replay_html
 
         with _spinner("writing the replay"):
             replay_html(path.trajectory, start, html)
@@ -306,10 +306,10 @@ def view(
 
     Example: guided-lgp view plan.json --port 8081
     """
-    from guided_lgp.nlp.plan_file import read_plan
-    from guided_lgp.report.live import view as serve
+    from guided_lgp.bounds.plan_file import read_plan
     from guided_lgp.scene import load_scene
     from guided_lgp.scene.validate import validate_scene
+    from guided_lgp.view.live import view as serve
 
     found = read_plan(file) if _is_plan(file) else None
     scene = found.scene if found else load_scene(file)

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
 
+from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.errors import InputError
 from guided_lgp.explanation import ObservedBounds, Obstacle
 from guided_lgp.logic import Goal, parse_objective, validate_objective
-from guided_lgp.nlp.bounds import SceneBounds
 from guided_lgp.params import Params, load_params
 from guided_lgp.paths import MODELS, PARAMS, SOURCES
 from guided_lgp.policy.inference import load_policy

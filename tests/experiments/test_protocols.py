@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from guided_lgp.bounds.results import Array, CoarseResult, Failure, PathResult
 from guided_lgp.experiments import compare_scalability, evaluate_generalization
 from guided_lgp.logic import (
     Action,
@@ -19,7 +20,6 @@ from guided_lgp.logic import (
     satisfied,
     two_goal_objectives,
 )
-from guided_lgp.nlp.results import Array, CoarseResult, Failure, PathResult
 from guided_lgp.params import BoundsParams, Params, load_params
 from guided_lgp.scene import Scene, generate
 from guided_lgp.search.enumerate import enumerate_sequences

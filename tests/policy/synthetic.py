@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from guided_lgp.bounds.results import Array
 from guided_lgp.logic import (
     Objective,
     Skeleton,
@@ -22,7 +23,6 @@ from guided_lgp.logic import (
     successor,
     two_goal_objectives,
 )
-from guided_lgp.nlp.results import Array
 from guided_lgp.scene import Box, Scene, Table
 
 TABLES = {"tab1": (0.54, 0.33, 0.60), "tab2": (0.54, -0.33, 0.60)}

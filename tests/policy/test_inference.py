@@ -11,9 +11,9 @@ import torch
 from safetensors.numpy import load_file, save_file
 from synthetic import make_scene, positions_along
 
+from guided_lgp.bounds.results import Array
 from guided_lgp.errors import InputError
 from guided_lgp.logic import Action, Objective, State, parse_objective, parse_skeleton, progress
-from guided_lgp.nlp.results import Array
 from guided_lgp.policy.encoding import CHAINS, Encoding
 from guided_lgp.policy.inference import FLOOR, load_policy
 from guided_lgp.policy.models import Model

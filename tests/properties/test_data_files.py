@@ -26,10 +26,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from safetensors.numpy import load_file, save_file
 
+from guided_lgp.bounds.plan_file import read_plan
 from guided_lgp.experiments.enumerate_sequences import SHORTEST, VERDICTS
 from guided_lgp.experiments.files import read_table, write_table
 from guided_lgp.logic import Symbols, two_goal_objectives
-from guided_lgp.nlp.plan_file import read_plan
 from guided_lgp.policy.dataset import Dataset, load_dataset
 from guided_lgp.policy.encoding import CHAINS, Encoding
 from guided_lgp.policy.inference import load_policy

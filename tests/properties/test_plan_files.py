@@ -12,9 +12,9 @@ from bad_input import answer, examples, garbled, odd_values, spoilt, truncated, 
 from hypothesis import given
 from hypothesis import strategies as st
 
+from guided_lgp.bounds.plan_file import Plan, read_plan, write_plan
+from guided_lgp.bounds.verify import verify_path
 from guided_lgp.logic import parse_objective
-from guided_lgp.nlp.plan_file import Plan, read_plan, write_plan
-from guided_lgp.nlp.verify import verify_path
 from guided_lgp.params import BoundsParams, load_params
 from guided_lgp.planning import plan
 from guided_lgp.scene import Scene

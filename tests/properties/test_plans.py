@@ -8,6 +8,8 @@ from bad_input import answer, examples
 from hypothesis import assume, event, given
 from hypothesis import strategies as st
 
+from guided_lgp.bounds.plan_file import read_plan, write_plan
+from guided_lgp.bounds.verify import verify_path
 from guided_lgp.logic import (
     Objective,
     applicable_actions,
@@ -17,8 +19,6 @@ from guided_lgp.logic import (
     successor,
     two_goal_objectives,
 )
-from guided_lgp.nlp.plan_file import read_plan, write_plan
-from guided_lgp.nlp.verify import verify_path
 from guided_lgp.params import BoundsParams, Params, SearchLimits, load_params
 from guided_lgp.planning import Planner, plan
 from guided_lgp.scene import Box, Scene, Table, generate

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from guided_lgp.bounds.results import Attachment, PathResult, Trajectory
 from guided_lgp.documents import write_json
 from guided_lgp.experiments.files import write_table
 from guided_lgp.experiments.problems import PROBLEMS
@@ -18,7 +19,6 @@ from guided_lgp.logic import (
     successor,
     two_goal_objectives,
 )
-from guided_lgp.nlp.results import Attachment, PathResult, Trajectory
 from guided_lgp.paths import EVALUATION, METRICS, SCENES, SEQUENCES, TRAINING
 from guided_lgp.policy.encoding import CHAINS
 from guided_lgp.scene import Scene, generate

@@ -49,7 +49,7 @@ def test_links_and_named_sources_exist(page: Path, rendered: Path) -> None:
             assert (page.parent / link).exists() or (rendered / link).exists(), link
     for name in re.findall(r"`((?:src/|tests/|stages/|examples/|benchmarks/)[\w/.]+)`", text):
         assert (ROOT / name).exists(), name
-    modules = r"`((?:logic|scene|nlp|search|policy|experiments|report)/[\w/]+(?:\.py)?)`"
+    modules = r"`((?:logic|scene|bounds|search|policy|experiments|report)/[\w/]+(?:\.py)?)`"
     for name in re.findall(modules, text):
         assert (ROOT / "src/guided_lgp" / name).exists(), name
 

@@ -4,8 +4,8 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
+from guided_lgp.bounds.results import Array, CoarseResult, Failure, PathResult
 from guided_lgp.logic import Action, Objective, Skeleton, State
-from guided_lgp.nlp.results import Array, CoarseResult, Failure, PathResult
 from guided_lgp.scene.model import Box, Scene, Table
 from guided_lgp.search.observation import start
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from guided_lgp.nlp.results import Keyframe
+from guided_lgp.bounds.results import Keyframe
 from guided_lgp.scene.model import Scene
 from guided_lgp.scene.pr2 import tool_pose
 from guided_lgp.search.observation import observe, start

@@ -17,12 +17,12 @@ from typing import Any
 import pyarrow as pa
 
 from guided_lgp import parallel
+from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.documents import write_json
 from guided_lgp.experiments.files import write_table
 from guided_lgp.experiments.memory import peak_mb, reset_peak
 from guided_lgp.experiments.problems import PROBLEMS, Problem
 from guided_lgp.logic import Objective, format_objective, format_skeleton
-from guided_lgp.nlp.bounds import SceneBounds
 from guided_lgp.params import BoundsParams, Params, SearchLimits
 from guided_lgp.paths import EVALUATION, METRICS, SCENES, TRAINED
 from guided_lgp.policy.inference import POLICIES, load_policy

@@ -21,6 +21,8 @@ import pyarrow.parquet as pq
 
 import guided_lgp
 from guided_lgp import parallel
+from guided_lgp.bounds.results import CoarseResult
+from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.experiments.files import write_table
 from guided_lgp.logic import (
     format_objective,
@@ -28,8 +30,6 @@ from guided_lgp.logic import (
     one_goal_objectives,
     two_goal_objectives,
 )
-from guided_lgp.nlp.bounds import SceneBounds
-from guided_lgp.nlp.results import CoarseResult
 from guided_lgp.params import BoundsParams, EnumerateSequences, Params
 from guided_lgp.paths import SCENES, SEQUENCES
 from guided_lgp.scene import Scene, load_scenes
@@ -180,7 +180,7 @@ def _sources() -> str:
     """Digest of the code that a verdict depends on."""
     package = Path(guided_lgp.__file__).parent
     digest = sha256()
-    for part in ("logic", "scene", "nlp", "search", "experiments"):
+    for part in ("logic", "scene", "bounds", "search", "experiments"):
         for path in sorted((package / part).rglob("*")):
             if path.suffix in {".py", ".c", ".h"}:
                 digest.update(path.read_bytes())

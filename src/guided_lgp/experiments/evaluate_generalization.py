@@ -16,6 +16,7 @@ from typing import Any
 import pyarrow as pa
 
 from guided_lgp import parallel
+from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.documents import write_json
 from guided_lgp.experiments.files import read_table, write_table
 from guided_lgp.logic import (
@@ -29,7 +30,6 @@ from guided_lgp.logic import (
     satisfied,
     two_goal_objectives,
 )
-from guided_lgp.nlp.bounds import SceneBounds
 from guided_lgp.params import BoundsParams, Params, SearchLimits
 from guided_lgp.paths import EVALUATION, METRICS, SCENES, SEQUENCES, TRAINED
 from guided_lgp.policy.inference import POLICIES, load_policy

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from guided_lgp import parallel
+from guided_lgp.bounds.results import Array, CoarseResult
 from guided_lgp.documents import write_json
 from guided_lgp.errors import InputError
 from guided_lgp.experiments.files import read_table
@@ -29,7 +30,6 @@ from guided_lgp.experiments.studies import (
     shortest_lengths,
 )
 from guided_lgp.logic import Skeleton, format_objective, parse_skeleton, progress
-from guided_lgp.nlp.results import Array, CoarseResult
 from guided_lgp.params import BoundsParams, SearchLimits
 from guided_lgp.paths import SCENES, SEQUENCES, TRAINED
 from guided_lgp.policy.feasibility import (

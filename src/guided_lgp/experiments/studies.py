@@ -18,6 +18,8 @@ import numpy as np
 from pydantic import Field
 
 from guided_lgp import parallel
+from guided_lgp.bounds.results import CoarseResult, PathResult
+from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.documents import write_json
 from guided_lgp.errors import InputError
 from guided_lgp.experiments.files import read_table
@@ -29,8 +31,6 @@ from guided_lgp.logic import (
     satisfied,
     two_goal_objectives,
 )
-from guided_lgp.nlp.bounds import SceneBounds
-from guided_lgp.nlp.results import CoarseResult, PathResult
 from guided_lgp.params import (
     BoundsParams,
     Count,

@@ -9,19 +9,19 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
+from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.documents import write_json, write_text
 from guided_lgp.logic import parse_skeleton
-from guided_lgp.nlp.bounds import SceneBounds
 from guided_lgp.params import BoundsParams, Params
 from guided_lgp.paths import METRICS, REPORTS
 from guided_lgp.policy.split import training_objectives
 from guided_lgp.report import analysis, figures, tables
 from guided_lgp.report.contents import compose, sentences
 from guided_lgp.report.inputs import Inputs, Metrics, compared, load_inputs
-from guided_lgp.report.pictures import draw_scene
-from guided_lgp.report.replay import replay_html
 from guided_lgp.report.style import GUIDED, PLANNERS, RIVALS
 from guided_lgp.report.table import Table
+from guided_lgp.view.pictures import draw_scene
+from guided_lgp.view.replay import replay_html
 
 REPLAYED = ("a", "b", "c", "d", "e10")
 """Setups of which one plan is replayed; a page of about 1 MB each."""

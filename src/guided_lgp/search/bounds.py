@@ -2,8 +2,8 @@
 
 from typing import Protocol
 
+from guided_lgp.bounds.results import CoarseResult, PathResult
 from guided_lgp.logic import Skeleton
-from guided_lgp.nlp.results import CoarseResult, PathResult
 
 
 class Bounds(Protocol):

@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from guided_lgp.bounds.results import CoarseResult
 from guided_lgp.logic import Objective, Skeleton, State, Symbols
-from guided_lgp.nlp.results import CoarseResult
 from guided_lgp.search.bounds import Bounds
 from guided_lgp.search.tree import StateSpace, distances
 

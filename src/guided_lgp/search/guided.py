@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from guided_lgp.bounds.results import Keyframe
 from guided_lgp.logic import (
     Objective,
     Skeleton,
@@ -13,7 +14,6 @@ from guided_lgp.logic import (
     unsatisfied,
     validate_objective,
 )
-from guided_lgp.nlp.results import Keyframe
 from guided_lgp.params import SearchLimits
 from guided_lgp.scene import Scene
 from guided_lgp.search.bounds import Bounds

@@ -5,8 +5,8 @@ from typing import Protocol
 
 import numpy as np
 
+from guided_lgp.bounds.results import Array
 from guided_lgp.logic import Action, Objective, State
-from guided_lgp.nlp.results import Array
 
 
 class Policy(Protocol):

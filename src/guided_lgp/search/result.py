@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from guided_lgp.bounds.results import Array, CoarseResult, Failure, PathResult
 from guided_lgp.logic import Action, Objective, Skeleton, State, format_skeleton
-from guided_lgp.nlp.results import Array, CoarseResult, Failure, PathResult
 from guided_lgp.params import SearchLimits
 from guided_lgp.search.bounds import Bounds
 from guided_lgp.search.policy import Policy

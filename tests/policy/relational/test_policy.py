@@ -13,6 +13,7 @@ import pytest
 import torch
 from safetensors.numpy import load_file, save_file
 
+from guided_lgp.bounds.results import Array
 from guided_lgp.errors import InputError
 from guided_lgp.logic import (
     Action,
@@ -23,7 +24,6 @@ from guided_lgp.logic import (
     applicable_actions,
     successor,
 )
-from guided_lgp.nlp.results import Array
 from guided_lgp.policy.inference import load_policy
 from guided_lgp.policy.relational.encoding import Range, applicable, graphs, situation
 from guided_lgp.policy.relational.inference import RelationalPolicy, load_relational

@@ -1,0 +1,295 @@
+"""The nonlinear program in arrays, and the two solvers of it: compiled and interpreted."""
+
+import ctypes
+import logging
+from dataclasses import astuple, dataclass, fields
+from functools import cache
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from guided_lgp.bounds.coarse.compiler import load_library
+from guided_lgp.bounds.coarse.kernels import kernels, reach
+from guided_lgp.bounds.results import Array
+
+Integers = NDArray[np.intc]
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Program:
+    """min 1/2 sum w (x - t)^2 over lower <= x <= upper, subject to the rows of kernel instances.
+
+    Instance i is kernel ``kernel[i]`` of the values at ``inputs[input_start[i]:...]`` (indices
+    below the number of variables are variables, the others constants) with the parameters that
+    start at ``parameters[parameter_start[i]]``; its rows start at ``row_start[i]``, and
+    ``row_start`` has one entry more, the number of rows. ``order[v]`` is the place of a variable
+    in the factorisation. The fields are those of the structure in C, in its order.
+    """
+
+    kernel: Integers
+    input_start: Integers
+    inputs: Integers
+    parameter_start: Integers
+    row_start: Integers
+    parameters: Array
+    weight: Array
+    target: Array
+    lower: Array
+    upper: Array
+    order: Integers
+
+    @property
+    def variables(self) -> int:
+        """Number of variables."""
+        return len(self.weight)
+
+    @property
+    def instances(self) -> int:
+        """Number of kernel instances."""
+        return len(self.kernel)
+
+    @property
+    def rows(self) -> int:
+        """Number of constraints."""
+        return int(self.row_start[-1])
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings of the augmented Lagrangian; the fields of the structure in C, in its order."""
+
+    penalty: float = 30.0
+    growth: float = 2.0
+    largest_penalty: float = 1e5
+    damping: float = 0.1
+    tolerance: float = 1e-3
+    """Largest violation of an equality, scaled."""
+    slack: float = 1e-2
+    """What an inequality may be violated by beyond the tolerance: its margin is larger."""
+    steps: int = 200
+    inner: int = 2
+    patience: int = 25
+    """Steps without a gain of 10 % on the violation before giving up."""
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Where the solver stopped."""
+
+    values: Array
+    """Variables, then constants."""
+    residuals: Array
+    """(rows,), scaled."""
+    violation: float
+    """Largest violation of a row, scaled; of an inequality, beyond the slack."""
+    steps: int
+
+    def converged(self, settings: Settings) -> bool:
+        """Whether all rows hold within the tolerance."""
+        return self.violation <= settings.tolerance
+
+
+class Solver(Protocol):
+    """Solves programs and closed-form inverse kinematics."""
+
+    def solve(self, program: Program, values: Array, settings: Settings) -> Solution:
+        """Solve from a start: values of the variables, then the constants."""
+        ...
+
+    def reach(self, arguments: Array) -> Array:
+        """Inverse kinematics: (count, 15) to (count, 8), see :func:`kernels.reach`."""
+        ...
+
+
+_COUNTS, _ARRAYS = ("variables", "instances", "rows"), tuple(f.name for f in fields(Program))
+
+
+class _CProgram(ctypes.Structure):
+    _fields_ = (
+        *((name, ctypes.c_int) for name in _COUNTS),
+        *((name, ctypes.c_void_p) for name in _ARRAYS),
+    )
+
+
+class _CSettings(ctypes.Structure):
+    _fields_ = tuple(
+        (f.name, ctypes.c_int if isinstance(f.default, int) else ctypes.c_double)
+        for f in fields(Settings)
+    )
+
+
+class Compiled:
+    """The loop in C with the kernels as machine code."""
+
+    def __init__(self, library: ctypes.CDLL) -> None:
+        self._solve = library.coarse_solve
+        self._solve.restype = ctypes.c_int
+        self._solve.argtypes = [ctypes.c_void_p] * 5
+        self._reach = library.coarse_reach
+        self._reach.restype = None
+        self._reach.argtypes = [ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p]
+
+    def solve(self, program: Program, values: Array, settings: Settings) -> Solution:
+        """See :class:`Solver`."""
+        values = np.array(values, dtype=np.float64)
+        residuals = np.empty(program.rows)
+        worst = ctypes.c_double()
+        header = _CProgram(
+            *(getattr(program, name) for name in _COUNTS),
+            *(getattr(program, name).ctypes.data for name in _ARRAYS),
+        )
+        options = _CSettings(*astuple(settings))
+        steps = self._solve(
+            ctypes.addressof(header),
+            ctypes.addressof(options),
+            values.ctypes.data,
+            residuals.ctypes.data,
+            ctypes.addressof(worst),
+        )
+        return Solution(values, residuals, worst.value, steps)
+
+    def reach(self, arguments: Array) -> Array:
+        """See :class:`Solver`."""
+        arguments = np.ascontiguousarray(arguments)
+        solutions = np.empty((len(arguments), 8))
+        self._reach(len(arguments), arguments.ctypes.data, solutions.ctypes.data)
+        return solutions
+
+
+class Interpreter:
+    """The same loop in numpy, with the kernels on CasADi's virtual machine."""
+
+    def solve(self, program: Program, values: Array, settings: Settings) -> Solution:
+        """See :class:`Solver`."""
+        n = program.variables
+        values = np.array(values, dtype=np.float64)
+        equality = np.concatenate(
+            [np.full(kernels()[k].rows, kernels()[k].equality) for k in program.kernel]
+        )
+        penalty, damping, tried = settings.penalty, settings.damping, 0
+        multiplier = np.zeros(program.rows)
+        c = self.residuals(program, values)
+        worst = best = _violation(c, equality, settings.slack)
+        improved = 0
+        while (
+            worst > settings.tolerance
+            and tried < settings.steps
+            and tried - improved < settings.patience
+        ):
+            value = _merit(program, values, c, multiplier, penalty, equality)
+            for _ in range(settings.inner):
+                if tried >= settings.steps:
+                    break
+                g, H = self._linearise(program, values, c, multiplier, penalty, equality)
+                x = values[:n].copy()
+                held = ((x <= program.lower) & (g > 0)) | ((x >= program.upper) & (g < 0))
+                free = ~held
+                accepted, gain = False, 0.0
+                while not accepted and tried < settings.steps:
+                    tried += 1
+                    direction = np.zeros(n)
+                    damped = H[np.ix_(free, free)] + damping * np.eye(int(free.sum()))
+                    direction[free] = np.linalg.solve(damped, -g[free])
+                    values[:n] = np.clip(x + direction, program.lower, program.upper)
+                    c_new = self.residuals(program, values)
+                    trial = _merit(program, values, c_new, multiplier, penalty, equality)
+                    if trial < value:
+                        accepted, gain, value, c = True, value - trial, trial, c_new
+                        damping = max(0.2 * damping, 1e-6)
+                    else:
+                        values[:n] = x
+                        damping *= 5
+                        if damping > 1e8:
+                            break
+                worst = _violation(c, equality, settings.slack)
+                if worst < 0.9 * best:
+                    best, improved = worst, tried
+                if worst <= settings.tolerance or not accepted or gain < 1e-2 * value:
+                    break
+            damping = min(damping, 1e3)
+            multiplier = multiplier - penalty * c
+            multiplier = np.where(equality, multiplier, np.maximum(multiplier, 0))
+            penalty = min(penalty * settings.growth, settings.largest_penalty)
+        return Solution(values, c, worst, tried)
+
+    def reach(self, arguments: Array) -> Array:
+        """See :class:`Solver`."""
+        solutions = reach().map(len(arguments))(np.asarray(arguments).T)
+        return np.array(solutions).T
+
+    def _arguments(self, program: Program, i: int, values: Array) -> tuple[Any, Array, Array]:
+        kernel = kernels()[program.kernel[i]]
+        inputs = program.inputs[program.input_start[i] :][: kernel.inputs]
+        parameters = program.parameters[program.parameter_start[i] :][: kernel.parameters]
+        return kernel, values[inputs], parameters
+
+    def residuals(self, program: Program, values: Array) -> Array:
+        """All rows (scaled) at values of the variables and constants."""
+        parts = []
+        for i in range(program.instances):
+            kernel, x, p = self._arguments(program, i, values)
+            parts.append(np.array(kernel.residual(x, p)).ravel())
+        return np.concatenate(parts)
+
+    def _linearise(
+        self,
+        program: Program,
+        values: Array,
+        c: Array,
+        multiplier: Array,
+        penalty: float,
+        equality: NDArray[np.bool_],
+    ) -> tuple[Array, Array]:
+        n = program.variables
+        shifted = c - multiplier / penalty
+        active = equality | (shifted < 0)
+        g = program.weight * (values[:n] - program.target)
+        H = np.diag(program.weight)
+        for i in range(program.instances):
+            rows = slice(int(program.row_start[i]), int(program.row_start[i + 1]))
+            if not active[rows].any():
+                continue
+            kernel, x, p = self._arguments(program, i, values)
+            inputs = program.inputs[program.input_start[i] :][: kernel.inputs]
+            variable = inputs < n
+            jacobian = np.array(kernel.jacobian(x, p)[1]).T[active[rows]][:, variable]
+            g_part = penalty * jacobian.T @ shifted[rows][active[rows]]
+            np.add.at(g, inputs[variable], g_part)
+            np.add.at(
+                H, np.ix_(inputs[variable], inputs[variable]), penalty * jacobian.T @ jacobian
+            )
+        return g, H
+
+
+def _violation(c: Array, equality: NDArray[np.bool_], slack: float) -> float:
+    return float(np.max(np.where(equality, np.abs(c), -c - slack), initial=0.0))
+
+
+def _merit(
+    program: Program,
+    values: Array,
+    c: Array,
+    multiplier: Array,
+    penalty: float,
+    equality: NDArray[np.bool_],
+) -> float:
+    shifted = c - multiplier / penalty
+    shifted = np.where(equality, shifted, np.minimum(shifted, 0))
+    deviation = values[: program.variables] - program.target
+    return 0.5 * float(program.weight @ deviation**2 + penalty * shifted @ shifted)
+
+
+@cache
+def default_solver() -> Solver:
+    """The compiled solver, or the interpreted one where there is no C compiler (said once)."""
+    library = load_library()
+    if library is not None:
+        return Compiled(library)
+    _log.warning(
+        "no C compiler found (cc, gcc, clang or the package ziglang): the coarse bound runs "
+        "on CasADi's virtual machine, with the same verdicts, about a hundred times slower"
+    )
+    return Interpreter()

@@ -1,0 +1,127 @@
+"""The path bound P(a_1:K): the dense motion for a whole skeleton (paper, eq. 4)."""
+
+import time
+from itertools import chain, islice
+
+from guided_lgp.bounds.coarse import CoarseBound
+from guided_lgp.bounds.path.assembly import assemble
+from guided_lgp.bounds.path.grips import grips_of
+from guided_lgp.bounds.path.motions import Mover
+from guided_lgp.bounds.path.optimise import optimise
+from guided_lgp.bounds.path.options import Options
+from guided_lgp.bounds.path.situation import Situation
+from guided_lgp.bounds.path.task import Outcome, Task, Trouble
+from guided_lgp.bounds.results import CoarseResult, Failure, PathResult
+from guided_lgp.bounds.verify import verify_path
+from guided_lgp.scene import Scene
+from guided_lgp.scene.world import World
+
+_ITERATIONS = 150
+"""Samples of the sampling planner per motion."""
+_QUERIES = 400
+"""Collision queries per action (and for four more) and coarse solution."""
+_VISITS = 8
+"""Situations in which an action is begun, counted in the same way."""
+
+
+class PathBound:
+    """Finds the motion for a skeleton, starting from its coarse solution.
+
+    The search goes through the actions in order. Box poses come from the coarse solution, grips,
+    elbows and, where needed, placements are chosen anew; an action that cannot be carried out sends
+    the search back to the grasp that it depends on, and in the end to another coarse solution.
+    """
+
+    def __init__(self, scene: Scene, coarse: CoarseBound, solutions: int) -> None:
+        """Prepare for one scene.
+
+        Args:
+            scene: the initial configuration.
+            coarse: gives further coarse solutions.
+            solutions: largest number of coarse solutions to try.
+        """
+        self._scene = scene
+        self._coarse = coarse
+        self._solutions = solutions
+        self._mover = Mover(scene, _ITERATIONS)
+        self._grips = {box.name: grips_of(box) for box in scene.boxes}
+        self._world = World(scene)
+
+    def solve(self, coarse_result: CoarseResult) -> PathResult:
+        """Find a verified motion.
+
+        Args:
+            coarse_result: a feasible result for the skeleton.
+
+        Returns:
+            The motion, or a failure that names the action and the obstacle met farthest on.
+        """
+        began = time.perf_counter()
+        skeleton = coarse_result.skeleton
+        trouble = Trouble()
+        others = self._coarse.solutions(skeleton, self._solutions)
+        tried = 0
+        for number, solution in enumerate(islice(chain([coarse_result], others), self._solutions)):
+            tried = number + 1
+            task = Task(
+                self._scene,
+                self._mover,
+                self._grips,
+                skeleton,
+                solution.contacts,
+                trouble,
+                number,
+            )
+            limit = self._mover.queries + _QUERIES * (len(skeleton) + 4)
+            outcomes = self._search(Options(task), limit, 0, task.start)
+            if not isinstance(outcomes, list):
+                continue
+            steps = [step for outcome in outcomes for step in outcome.steps]
+            for chosen in (optimise(self._mover, steps), steps):
+                trajectory = assemble(task.start, chosen)
+                report = verify_path(self._world, skeleton, trajectory)
+                if report.violation is None:
+                    break
+            if report.violation is not None:
+                fault = report.violation
+                trouble.note(fault.action, 10, fault.constraint)
+                continue
+            return PathResult(
+                skeleton,
+                feasible=True,
+                trajectory=trajectory,
+                contacts=tuple(outcome.contact for outcome in outcomes),
+                verification={
+                    "configurations": report.configurations,
+                    "deepest_penetration_m": report.deepest_penetration,
+                },
+                time_s=time.perf_counter() - began,
+            )
+        failure = Failure(
+            max(trouble.action, 0),
+            trouble.constraint,
+            float("nan"),
+            f"{tried} coarse solutions with grips, elbows and placements chosen anew",
+        )
+        return PathResult(
+            skeleton,
+            feasible=False,
+            failure=failure,
+            time_s=time.perf_counter() - began,
+        )
+
+    def _search(
+        self, options: Options, limit: int, index: int, situation: Situation
+    ) -> list[Outcome] | int:
+        """Carry out the actions from ``index`` on, or say which earlier one to change."""
+        if index == options.length:
+            return []
+        for outcome in options.of(index, situation):
+            rest = self._search(options, limit, index + 1, outcome.situation)
+            if isinstance(rest, list):
+                return [outcome, *rest]
+            if rest < index:
+                return rest
+            if self._mover.queries > limit or options.visits > _VISITS * (options.length + 4):
+                return -1
+        return options.culprit(index)

@@ -1,0 +1,206 @@
+"""Motions of one arm while everything else stands still: transits and straight lines."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from guided_lgp.bounds.path.collision import CollisionChecker, Mode
+from guided_lgp.bounds.path.connect import connect, shortcut
+from guided_lgp.bounds.path.ik import Arm
+from guided_lgp.bounds.path.spaces import (
+    JointSpace,
+    LevelSpace,
+    continuous_path,
+    turned,
+    wound,
+)
+from guided_lgp.bounds.path.timing import time_path
+from guided_lgp.bounds.results import Array
+from guided_lgp.scene import GRIPPERS, Scene
+
+LINE_STEP = 0.01
+"""Distance (m) of configurations along a straight line."""
+_ASTRAY = 0.001
+"""How far (m, tenths of rad) the tool may leave a straight line between two configurations."""
+_ROUNDINGS = (0.35, 0.1)
+"""Shares of a corner's edges that its rounding may take."""
+_SHORTCUTS = 12
+"""Random shortcuts tried on a path of the sampling planner."""
+
+
+@dataclass(frozen=True)
+class Still:
+    """What stands still while one arm moves: the mode, the other arm, the fingers."""
+
+    mode: Mode
+    q: Array
+    """Configuration (14,); the moving arm's part does not matter."""
+    fingers: Mapping[str, float]
+    """Value (rad) of the finger joints by gripper."""
+
+
+@dataclass(frozen=True)
+class Free:
+    """Why a motion could be another: it only has to keep clear of what stands still."""
+
+    still: Still
+    level: bool
+    """Whether the hand keeps its tilt."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """One arm follows a path from rest to rest."""
+
+    gripper: str
+    path: Array
+    """Configurations (n, 7) in rad, for a cubic spline through them."""
+    free: Free | None = None
+    """None for a straight line, which is where it has to be."""
+
+    @cached_property
+    def timed(self) -> tuple[Array, Array]:
+        """Times (T,) in s and configurations (T, 7)."""
+        return time_path(self.path, self.gripper)
+
+
+class Mover:
+    """Plans motions in one scene. Deterministic: every call brings its source of randomness."""
+
+    def __init__(self, scene: Scene, iterations: int) -> None:
+        self.arms = {gripper: Arm(scene, gripper) for gripper in GRIPPERS}
+        self._checker = CollisionChecker(scene)
+        self._iterations = iterations
+
+    @property
+    def queries(self) -> int:
+        """Collision queries so far: the measure of effort."""
+        return self._checker.queries
+
+    def collision(self, still: Still, q: Array) -> tuple[str, str] | None:
+        """The first pair of bodies in collision along configurations (n, 7) of the moving arm."""
+        return self._space(still).collision(q)
+
+    def distances(self, still: Still, q: Array, count: int) -> tuple[Array, Array]:
+        """Smallest distances (n, count) in m along configurations (n, 7) of the moving arm, and
+        their gradients (n, count, 7).
+        """
+        return self._space(still).distances(q, count)
+
+    def line(
+        self,
+        still: Still,
+        tool: tuple[Array, Array],
+        direction: Array,
+        pans: tuple[float, float],
+        side: int,
+    ) -> Array | str:
+        """A free straight line of the tool, which does not turn.
+
+        Args:
+            still: what stands still.
+            tool: rotation (3, 3) and origin (3,) of the tool frame at the start.
+            direction: displacement (3,) of the tool (m).
+            pans: angle of the pan joint (rad) at the start and at the end.
+            side: of the elbow.
+
+        Returns:
+            Configurations (n, 7), or what is wrong with it.
+        """
+        arm = self.arms[still.mode.gripper]
+        count = 2 + int(np.linalg.norm(direction) / LINE_STEP)
+        position = tool[1] + np.linspace(0.0, 1.0, count)[:, None] * direction
+        q, valid = arm.inverse(tool[0], position, np.linspace(*pans, count))
+        path = continuous_path(q[:, side], valid[:, side])
+        if path is None:
+            return "out of reach"
+        rotation, middle = arm.forward((path[:-1] + path[1:]) / 2)
+        astray = np.abs(middle - (position[:-1] + position[1:]) / 2).max()
+        turned_by = np.abs(rotation - tool[0]).max()
+        if astray > _ASTRAY or turned_by > 10 * _ASTRAY:
+            return "out of reach"
+        blocked = self.collision(still, path)
+        return path if blocked is None else f"collision {' '.join(blocked)}"
+
+    def transit(
+        self, still: Still, start: Array, goal: Array, rng: np.random.Generator
+    ) -> list[Array] | None:
+        """A free motion in joint space: the direct line, or else RRT-Connect and shortcuts.
+
+        Returns:
+            Paths (n, 7) with a rest between two of them, or None.
+        """
+        space = self._space(still)
+        points = connect(space, start, goal, rng, self._iterations)
+        if points is None:
+            return None
+        if len(points) > 2:
+            points = shortcut(space, points, rng, _SHORTCUTS)
+        return _rounded(space, points)
+
+    def level_transit(
+        self, still: Still, start: Array, goal: Array, rng: np.random.Generator
+    ) -> list[Array] | None:
+        """A free motion on which the hand keeps its tilt: what it holds stays level.
+
+        Both ends must have the elbow on the same side, and the hand at the same tilt.
+        """
+        arm = self.arms[still.mode.gripper]
+        rotation, position = arm.forward(np.stack([start, goal]))
+        turn = rotation[1] @ rotation[0].T
+        yaw = float(np.arctan2(turn[1, 0], turn[0, 0]))
+        if not np.allclose(turned(rotation[0], np.array([yaw]))[0], rotation[1], atol=1e-6):
+            return None
+        side = self.side(arm.gripper, start)
+        if self.side(arm.gripper, goal) != side:
+            return None
+        space = LevelSpace(self._space(still), arm, rotation[0], side)
+        ends = np.array([[*position[0], 0.0, start[0]], [*position[1], yaw, goal[0]]])
+        points = connect(space, ends[0], ends[1], rng, self._iterations)
+        if points is None:
+            return None
+        if len(points) > 2:
+            points = shortcut(space, points, rng, _SHORTCUTS)
+        paths: list[Array] = []
+        for first, last in pairwise(points):
+            path = space.path(first, last)
+            assert path is not None  # the planner has followed it
+            paths.append(wound(path, start if not paths else paths[-1][-1]))
+        return paths
+
+    def side(self, gripper: str, q: Array) -> int:
+        """On which side (0 or 1) of the inverse kinematics the elbow is for joints (7,)."""
+        arm = self.arms[gripper]
+        solutions, _ = arm.inverse(*arm.forward(q), q[0])
+        return int(np.argmin(np.abs(np.sin((solutions - q) / 2)).sum(axis=1)))
+
+    def _space(self, still: Still) -> JointSpace:
+        self._checker.enter(still.mode)
+        return JointSpace(self._checker, self.arms[still.mode.gripper], still.q, still.fingers)
+
+
+def _rounded(space: JointSpace, points: list[Array]) -> list[Array]:
+    """The polyline as smooth paths: corners become parabolas where these are free.
+
+    A corner that cannot be rounded becomes a rest.
+    """
+    paths: list[Array] = []
+    path = [points[0]]
+    for before, corner, after in zip(points, points[1:], points[2:], strict=False):
+        for share in _ROUNDINGS:
+            begin, end = (
+                corner + share * (before - corner),
+                corner + share * (after - corner),
+            )
+            t = np.linspace(0.0, 1.0, 9)[:, None]
+            curve = (1 - t) ** 2 * begin + 2 * t * (1 - t) * corner + t**2 * end
+            if space.collision(curve) is None:
+                path += [*space.path(path[-1], begin)[1::2], *curve]
+                break
+        else:
+            paths.append(np.array([*path, *space.path(path[-1], corner)[1:]]))
+            path = [corner]
+    return [*paths, np.array([*path, *space.path(path[-1], points[-1])[1:]])]

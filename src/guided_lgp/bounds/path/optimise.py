@@ -1,0 +1,300 @@
+"""Free motions optimised: shorter and smoother, without a rest where a straight line begins.
+
+A free motion is a cubic spline through waypoints q_1:N; the straight lines beside it are kept. With
+q_0 and q_N+1 its ends, S its first length, h = S / (N + 1), and joints in units of W = 1 / velocity
+limit (so that lengths are times at full speed, in s), it minimises length and smoothness,
+
+    sum_i |W (q_i+1 - q_i)|^2 / h + tau^2 sum_i |W (q_i+1 - 2 q_i + q_i-1)|^2 / h^3.
+
+Where a straight line precedes or follows, its direction gives one more point beyond the end, so
+that the spline goes on along the line. Motions of two actions that follow each other without a step
+in between are one: the arm need not go home on the way. Constraints are the joint limits and, for
+every waypoint and the pairs of bodies nearest to each other there, the distance d and the tilt z
+(the vertical in the tool frame, kept on level motions), both linearised about the last iterate p:
+
+    d(p_i) + d'(p_i) (q_i - p_i) >= CLEARANCE - slack_i,    z(p_i) + z'(p_i) (q_i - p_i) = z_0.
+
+CasADi derives this quadratic program once; every motion only fills in its numbers. An iterate
+counts if its whole spline passes the collision checker.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from itertools import groupby
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from guided_lgp.bounds.coarse.kinematics import arm_pose
+from guided_lgp.bounds.path.ik import REACH, Arm
+from guided_lgp.bounds.path.motions import Free, Motion, Mover
+from guided_lgp.bounds.path.situation import Step
+from guided_lgp.bounds.path.spaces import STEP
+from guided_lgp.bounds.results import Array
+from guided_lgp.scene.pr2 import JOINT_LIMITS, VELOCITY_LIMITS, arm_slice
+
+WAYPOINTS = 10
+"""N, between the ends of a motion."""
+NEIGHBOURS = 4
+"""Pairs of bodies whose distance is constrained at a waypoint."""
+CLEARANCE = 0.012
+"""Distance (m) of bodies at the waypoints."""
+ROUNDS = 5
+"""Quadratic programs per motion, at most."""
+LEVEL = 0.01
+"""How far (in sines) the vertical may turn in the tool frame on a level motion."""
+_TAU = 0.4
+"""Weight of smoothness against length (s): about the time in which a joint reaches full speed."""
+_TRUST = 0.3
+"""Largest change (rad) of a joint in a round that linearises constraints."""
+_CONVERGED = 0.03
+"""Change (rad) below which another round is not worth its time."""
+_SLACK_WEIGHT, _LEVEL_WEIGHT = 1e4, 1e4
+"""Weights of the squared slacks (1/m^2) and tilts, against seconds: 1 mm costs 0.01 s."""
+_SHORTEST = 0.05
+"""Shortest motion (s at full speed) that is optimised."""
+_INSET, _NEAR_LIMIT = 0.02, 0.005
+"""Distance (rad) from the joint limits, of the waypoints and of the spline, which overshoots."""
+_FINE = 200
+"""Points at which the length of a spline is measured."""
+
+_W: Array = 1.0 / VELOCITY_LIMITS[:7]
+
+
+def optimise(mover: Mover, steps: Iterable[Step]) -> list[Step]:
+    """Optimise the free motions of a plan and join them with the straight lines beside them.
+
+    Motions of one arm that follow each other, no other step in between, stay as they are where
+    the optimised ones would not be faster.
+    """
+    result: list[Step] = []
+    for gripper, group in groupby(steps, key=lambda s: s.gripper if isinstance(s, Motion) else ""):
+        run = list(group)
+        motions = [step for step in run if isinstance(step, Motion)]
+        faster = _joined(mover, gripper, motions)
+        result += faster if _duration(faster) < _duration(motions) else run
+    return result
+
+
+def _duration(motions: Sequence[Motion]) -> float:
+    return sum(float(motion.timed[0][-1]) for motion in motions)
+
+
+def _joined(mover: Mover, gripper: str, motions: Sequence[Motion]) -> list[Motion]:
+    """The free motions optimised, those that succeed joined with the lines before and after."""
+    pieces = [list(piece) for _, piece in groupby(motions, key=_freedom)]
+    paths = [np.concatenate([p[0].path, *(m.path[1:] for m in p[1:])]) for p in pieces]
+    lines = {i: paths[i] for i, piece in enumerate(pieces) if piece[0].free is None}
+    optimised = {
+        i: path
+        for i, piece in enumerate(pieces)
+        if piece[0].free is not None
+        and (path := _optimised(mover, piece[0].free, paths[i], lines.get(i - 1), lines.get(i + 1)))
+        is not None
+    }
+    result: list[Motion] = []
+    for i, piece in enumerate(pieces):
+        new = [Motion(gripper, optimised[i])] if i in optimised else piece
+        if (i in optimised and i - 1 in lines) or (i in lines and i - 1 in optimised):
+            new = [
+                Motion(gripper, np.concatenate([result.pop().path, new[0].path[1:]])),
+                *new[1:],
+            ]
+        result += new
+    return result
+
+
+def _freedom(motion: Motion) -> bool | None:
+    """What a motion may be, None for a straight line.
+
+    Free motions that follow each other have the same surroundings, so they are one.
+    """
+    return None if motion.free is None else motion.free.level
+
+
+def _optimised(
+    mover: Mover, free: Free, path: Array, before: Array | None, after: Array | None
+) -> Array | None:
+    """The best free spline (n, 7) between the ends of a path, or None.
+
+    The first round has no constraints but the joint limits: most motions are then done. The
+    others start again from the path, in steps for which the linearisation holds.
+
+    Args:
+        mover: checks it.
+        free: what it must keep clear of.
+        path: (n, 7) from which to start.
+        before: the straight line that leads to its first configuration, if there is one.
+        after: the one that begins at its last.
+    """
+    lengths = np.linalg.norm(np.diff(path, axis=0) * _W, axis=1)
+    s = np.concatenate([[0.0], np.cumsum(lengths)])
+    if s[-1] < _SHORTEST:
+        return None
+    spline = _Spline(
+        np.linspace(0.0, s[-1], WAYPOINTS + 2),
+        None if before is None else _direction(before[-2], before[-1]),
+        None if after is None else _direction(after[0], after[1]),
+    )
+    points = np.stack([np.interp(spline.knots, s, joint) for joint in path.T], axis=1)
+    arm = mover.arms[free.still.mode.gripper]
+    vertical = arm.forward(path[0])[0][2] if free.level else None
+    limits = JOINT_LIMITS[arm_slice(arm.gripper)]
+    best: Array | None = None
+    for number in range(ROUNDS):
+        linearised = free.level or number > 0
+        near = mover.distances(free.still, points[1:-1], NEIGHBOURS) if linearised else None
+        last = points
+        inner = _round(spline, last, near, arm.sign, vertical, limits)
+        if inner is None:
+            break
+        moved = np.concatenate([last[:1], inner, last[-1:]])
+        candidate = spline.sampled(moved)
+        clear = (
+            np.all(
+                (candidate > limits[:, 0] + _NEAR_LIMIT) & (candidate < limits[:, 1] - _NEAR_LIMIT)
+            )
+            and (vertical is None or _turned(arm, candidate, vertical) < LEVEL)
+            and mover.collision(free.still, candidate) is None
+        )
+        if clear:
+            best = candidate
+            if not linearised or np.abs(moved - last).max() < _CONVERGED:
+                break
+        points = moved if linearised else last
+    return best
+
+
+def _direction(start: Array, end: Array) -> Array:
+    """Of a line in joint space; its length is 1 s at full speed."""
+    return np.asarray((end - start) / np.linalg.norm((end - start) * _W))
+
+
+def _turned(arm: Arm, path: Array, vertical: Array) -> float:
+    """How far the vertical turns in the tool frame along a path (n, 7)."""
+    return float(np.abs(arm.forward(path)[0][:, 2] - vertical).max())
+
+
+@dataclass(frozen=True)
+class _Spline:
+    """What all splines of one motion share."""
+
+    knots: Array
+    """(WAYPOINTS + 2,) s at full speed."""
+    out: Array | None
+    """Derivative (7,) at the start; None where the motion begins at rest."""
+    into: Array | None
+    """The same for the end."""
+
+    def sampled(self, points: Array) -> Array:
+        """Through (WAYPOINTS + 2, 7), at steps that are short enough for collision checks."""
+        rest = (2, np.zeros(points.shape[1]))
+        ends = (rest if slope is None else (1, slope) for slope in (self.out, self.into))
+        curve = CubicSpline(self.knots, points, bc_type=tuple(ends))
+        fine = np.linspace(0.0, self.knots[-1], _FINE)
+        ways = np.sum(np.abs(np.diff(curve(fine), axis=0)) * REACH, axis=1)
+        way = np.concatenate([[0.0], np.cumsum(ways)])
+        marks = np.linspace(0.0, way[-1], 2 + int(way[-1] / STEP))
+        path = np.asarray(curve(np.interp(marks, way, fine)))
+        path[0], path[-1] = points[0], points[-1]
+        return path
+
+
+def _round(
+    spline: _Spline,
+    last: Array,
+    near: tuple[Array, Array] | None,
+    sign: Array,
+    vertical: Array | None,
+    limits: Array,
+) -> Array | None:
+    """Solve the quadratic program of one round.
+
+    Args:
+        spline: its knots and the slopes at its ends.
+        last: the iterate (WAYPOINTS + 2, 7) with both ends.
+        near: distances (WAYPOINTS, NEIGHBOURS) and gradients (..., 7); None to leave them out,
+            and the trust region with them.
+        sign: (7,) of the joints, to mirror a right arm.
+        vertical: (3,) in the tool frame, where it is to be kept.
+        limits: (7, 2) of the joints.
+
+    Returns:
+        the next waypoints (WAYPOINTS, 7), or None if the solver fails.
+    """
+    h = float(spline.knots[1])
+    inner = last[1:-1]
+    low = np.full_like(inner, limits[:, 0] + _INSET)
+    high = np.full_like(inner, limits[:, 1] - _INSET)
+    gradients = np.zeros((WAYPOINTS, NEIGHBOURS, 7))
+    least = np.full((WAYPOINTS, NEIGHBOURS), -np.inf)
+    if near is not None:
+        distances, gradients = near
+        least = CLEARANCE - distances + np.einsum("imj,ij->im", gradients, inner)
+        low, high = np.maximum(low, inner - _TRUST), np.minimum(high, inner + _TRUST)
+    before = last[0] if spline.out is None else last[0] - h * spline.out
+    after = last[-1] if spline.into is None else last[-1] + h * spline.into
+    flags = [spline.out is not None, spline.into is not None, vertical is not None]
+    upright = np.zeros(3) if vertical is None else vertical * (1.0, sign[0], 1.0)
+    rows = (*last * sign, before * sign, after * sign, (gradients * sign).ravel())
+    bounds = np.sort(np.stack([low * sign, high * sign]), axis=0).reshape(2, -1)
+    slack = np.full(WAYPOINTS, np.inf)
+    solver = quadratic_program()
+    solution = solver(
+        p=np.concatenate([*rows, upright, flags, [h]]),
+        lbx=np.concatenate([bounds[0], -slack]),
+        ubx=np.concatenate([bounds[1], slack]),
+        lbg=least.ravel(),
+    )
+    if not solver.stats()["success"]:
+        return None
+    return np.asarray(solution["x"])[: inner.size, 0].reshape(inner.shape) * sign
+
+
+@cache
+def quadratic_program() -> Any:
+    """The program of one round for a left arm (right arms are mirrored), derived by CasADi."""
+    q, slack = ca.SX.sym("q", 7, WAYPOINTS), ca.SX.sym("slack", WAYPOINTS)
+    last = ca.SX.sym("last", 7, WAYPOINTS + 2)
+    before, after = ca.SX.sym("before", 7), ca.SX.sym("after", 7)
+    gradients = ca.SX.sym("gradients", 7, WAYPOINTS * NEIGHBOURS)
+    vertical = ca.SX.sym("vertical", 3)
+    leaves, enters, level, h = (ca.SX.sym(name) for name in ("leaves", "enters", "level", "h"))
+    points = ca.horzcat(last[:, 0], q, last[:, -1])
+    weights = ca.diag(ca.SX(_W))
+    steps = weights @ (points[:, 1:] - points[:, :-1])
+    bends = steps[:, 1:] - steps[:, :-1]
+    first = steps[:, 0] - weights @ (last[:, 0] - before)
+    final = weights @ (after - last[:, -1]) - steps[:, -1]
+    smoothness = ca.sumsqr(bends) + leaves * ca.sumsqr(first) + enters * ca.sumsqr(final)
+    cost = ca.sumsqr(steps) / h + _TAU**2 * smoothness / h**3 + _SLACK_WEIGHT * ca.sumsqr(slack)
+    angles = ca.SX.sym("angles", 7)
+    up = arm_pose(angles, 1, 0).rotation[2, :].T
+    tilt = ca.Function("tilt", [angles], [up, ca.jacobian(up, angles)])
+    for i in range(WAYPOINTS):
+        now, change = tilt(last[:, i + 1])
+        turned = now + change @ (q[:, i] - last[:, i + 1]) - vertical
+        cost += _LEVEL_WEIGHT * level * ca.sumsqr(turned)
+    nearest = ca.vertcat(
+        *(
+            ca.dot(gradients[:, i * NEIGHBOURS + k], q[:, i]) + slack[i]
+            for i in range(WAYPOINTS)
+            for k in range(NEIGHBOURS)
+        )
+    )
+    numbers = ca.vertcat(
+        ca.vec(last),
+        before,
+        after,
+        ca.vec(gradients),
+        vertical,
+        leaves,
+        enters,
+        level,
+        h,
+    )
+    problem = {"x": ca.vertcat(ca.vec(q), slack), "f": cost, "g": nearest, "p": numbers}
+    return ca.qpsol("motion", "daqp", problem, {"error_on_fail": False})

@@ -1,0 +1,110 @@
+"""What is where between two motions, and the steps that lead from one to the next."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pinocchio as pin
+
+from guided_lgp.bounds.path.collision import Mode
+from guided_lgp.bounds.path.ik import Arm
+from guided_lgp.bounds.path.motions import Motion, Still
+from guided_lgp.bounds.results import Array, Keyframe
+from guided_lgp.logic import State
+from guided_lgp.scene.poses import compose, inverse
+from guided_lgp.scene.pr2 import arm_slice
+
+
+@dataclass(frozen=True)
+class Fingers:
+    """A gripper opens or closes its fingers to a value of the finger joints (rad)."""
+
+    gripper: str
+    value: float
+
+
+@dataclass(frozen=True)
+class Attach:
+    """Boxes become rigid in the tool frame of a gripper."""
+
+    boxes: tuple[str, ...]
+    gripper: str
+
+
+@dataclass(frozen=True)
+class Release:
+    """Boxes stay where they are in the world."""
+
+    boxes: tuple[str, ...]
+
+
+Step = Motion | Fingers | Attach | Release
+
+
+@dataclass(frozen=True)
+class Situation:
+    """Robot and boxes at rest."""
+
+    state: State
+    q: Array
+    """Configuration (14,) in rad."""
+    fingers: Mapping[str, float]
+    """Value (rad) of the finger joints by gripper."""
+    standing: Mapping[str, Array]
+    """World pose (7,) of every box that no gripper carries."""
+    carried: Mapping[str, tuple[str, Array]]
+    """Gripper, and pose (7,) in its tool frame, of every box held or standing on a held one."""
+
+    def boxes(self, arms: Mapping[str, Arm]) -> dict[str, Array]:
+        """World pose (7,) of every box."""
+        carriers = sorted({gripper for gripper, _ in self.carried.values()})
+        tools = {gripper: tool_pose(arms[gripper], self.q) for gripper in carriers}
+        poses = dict(self.standing)
+        for box, (gripper, grasp) in self.carried.items():
+            poses[box] = compose(tools[gripper], grasp)
+        return poses
+
+    def still(self, gripper: str, touching: Iterable[tuple[str, str]] = ()) -> Still:
+        """What stands still while the gripper's arm moves."""
+        contacts = frozenset(frozenset(pair) for pair in touching)
+        mode = Mode(gripper, self.standing, self.carried, contacts | self._held_contacts())
+        return Still(mode, self.q, self.fingers)
+
+    def after(self, step: Step, arms: Mapping[str, Arm]) -> "Situation":
+        """The situation after a step (the symbolic state does not change here)."""
+        match step:
+            case Motion(gripper, path):
+                q = self.q.copy()
+                q[arm_slice(gripper)] = path[-1]
+                return replace(self, q=q)
+            case Fingers(gripper, value):
+                return replace(self, fingers={**self.fingers, gripper: value})
+            case Attach(boxes, gripper):
+                poses = self.boxes(arms)
+                tool = inverse(tool_pose(arms[gripper], self.q))
+                taken = {box: (gripper, compose(tool, poses[box])) for box in boxes}
+                standing = {b: p for b, p in self.standing.items() if b not in boxes}
+                return replace(self, standing=standing, carried={**self.carried, **taken})
+            case Release(boxes):
+                poses = self.boxes(arms)
+                carried = {b: c for b, c in self.carried.items() if b not in boxes}
+                standing = {**self.standing, **{box: poses[box] for box in boxes}}
+                return replace(self, standing=standing, carried=carried)
+
+    def keyframe(self, arms: Mapping[str, Arm]) -> Keyframe:
+        """The configuration x_k."""
+        return Keyframe(self.q, self.boxes(arms))
+
+    def _held_contacts(self) -> frozenset[frozenset[str]]:
+        """A hand touches the box that it holds, and a box what stands on it."""
+        return frozenset(frozenset((box, gripper)) for box, gripper in self.state.held)
+
+
+def tool_pose(arm: Arm, q: Array) -> Array:
+    """Pose (7,) of the tool frame for a configuration (14,)."""
+    return matrix_pose(*arm.forward(q[arm_slice(arm.gripper)]))
+
+
+def matrix_pose(rotation: Array, position: Array) -> Array:
+    """The pose (7,) of a rotation matrix (3, 3) and an origin (3,)."""
+    return np.concatenate([position, pin.Quaternion(rotation).coeffs()])

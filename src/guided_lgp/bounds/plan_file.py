@@ -1,0 +1,208 @@
+"""The file ``plan.json``: a plan that anyone can replay and check (DESIGN §7).
+
+``q`` rows follow ``joint_names``; a box is rigid in the tool frame of the attachment's gripper from
+``start`` to ``end`` (indices into ``times``), so that box poses follow from the scene, the
+attachments and forward kinematics. Lengths in m, angles in rad, times in s.
+"""
+
+import json
+from collections.abc import Mapping
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Any, Self
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from guided_lgp.bounds.results import JOINT_NAMES, Attachment, Keyframe, PathResult, Trajectory
+from guided_lgp.bounds.verify.path import switches_of
+from guided_lgp.documents import read_json, write_text
+from guided_lgp.errors import InputError
+from guided_lgp.logic import Action, Goal, Objective, Skeleton
+from guided_lgp.scene import Scene
+from guided_lgp.scene.poses import yaw_of
+
+_DECIMALS = 6
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Angle = Annotated[float, Field(ge=-100, le=100)]
+Time = Annotated[float, Field(ge=0, le=1e5)]
+Index = Annotated[int, Field(strict=True, ge=0)]
+
+
+class _Document(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class BoxPose(_Document):
+    """Where a box is; ``quaternion`` is ``[x, y, z, w]``, since a held box may be tilted."""
+
+    position: tuple[Finite, Finite, Finite]
+    yaw: Finite
+    quaternion: tuple[Finite, Finite, Finite, Finite]
+
+
+class PlanKeyframe(_Document):
+    """The configuration at the switch of one action."""
+
+    q: tuple[Angle, ...]
+    boxes: dict[str, BoxPose]
+
+
+class PlanAttachment(_Document):
+    """The box is rigid in the gripper's tool frame from ``start`` to ``end``."""
+
+    box: str
+    gripper: str
+    start: Index
+    end: Index
+
+
+class PlanPath(_Document):
+    """The dense motion."""
+
+    times: Annotated[tuple[Time, ...], Field(min_length=1)]
+    q: tuple[tuple[Angle, ...], ...]
+    attachments: tuple[PlanAttachment, ...]
+
+
+class Plan(_Document):
+    """The whole file."""
+
+    scene: Scene
+    objective: tuple[str, ...]
+    actions: tuple[str, ...]
+    joint_names: tuple[str, ...]
+    fixed_joints: dict[str, Finite]
+    keyframes: tuple[PlanKeyframe, ...]
+    path: PlanPath
+    statistics: dict[str, Any]
+    verification: dict[str, Any]
+    physics: dict[str, Any]
+
+    @property
+    def goals(self) -> Objective:
+        """The objective that the plan achieves."""
+        return tuple(map(Goal.parse, self.objective))
+
+    @property
+    def skeleton(self) -> Skeleton:
+        """The actions a_1:K."""
+        return tuple(map(Action.parse, self.actions))
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """The motion."""
+        return Trajectory(
+            self.joint_names,
+            np.array(self.path.times),
+            np.array(self.path.q),
+            tuple(Attachment(**vars(attachment)) for attachment in self.path.attachments),
+        )
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if sorted(self.joint_names) != sorted(JOINT_NAMES):
+            raise ValueError(f"joint_names are not the {len(JOINT_NAMES)} of arms and fingers")
+        rows, width = len(self.path.times), len(self.joint_names)
+        if len(self.path.q) != rows:
+            raise ValueError(f"path.q has {len(self.path.q)} rows for {rows} times")
+        if any(len(row) != width for row in (*self.path.q, *(k.q for k in self.keyframes))):
+            raise ValueError(f"a row q has not one value for each of {width} joint_names")
+        if any(later <= earlier for earlier, later in pairwise(self.path.times)):
+            raise ValueError("path.times do not increase")
+        if len(self.keyframes) != len(self.actions):
+            raise ValueError(f"{len(self.keyframes)} keyframes for {len(self.actions)} actions")
+        symbols = self.scene.symbols
+        for attachment in self.path.attachments:
+            if attachment.box not in symbols.boxes or attachment.gripper not in symbols.grippers:
+                raise ValueError(
+                    f"attachment of unknown box or gripper: {attachment.box} {attachment.gripper}"
+                )
+            if not attachment.start <= attachment.end < rows:
+                raise ValueError(f"attachment of {attachment.box} lies outside path.times")
+        for text in self.objective:
+            Goal.parse(text)
+        for text in self.actions:
+            Action.parse(text)
+        return self
+
+
+def write_plan(
+    path: Path,
+    scene: Scene,
+    objective: Objective,
+    result: PathResult,
+    statistics: Mapping[str, object],
+    physics: Mapping[str, object] | None = None,
+) -> None:
+    """Write a plan.
+
+    Args:
+        path: the file; its folder is made.
+        scene: the initial configuration.
+        objective: the goals that the plan achieves.
+        result: a feasible result of the path bound.
+        statistics: tree size, attempts and times of the search, as DESIGN §7 names them.
+        physics: outcome of the execution under gravity, if there was one.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    trajectory = result.trajectory
+    if trajectory is None:
+        raise ValueError("an infeasible result has no plan")
+    switches = switches_of(scene, result.skeleton, trajectory)
+    assert isinstance(switches, list)  # the result has been verified
+    rows = np.round(trajectory.q, _DECIMALS)
+    document = {
+        "scene": scene.model_dump(mode="json"),
+        "objective": list(map(str, objective)),
+        "actions": list(map(str, result.skeleton)),
+        "joint_names": list(trajectory.joint_names),
+        "fixed_joints": {"torso_lift_joint": scene.robot.torso},
+        "keyframes": [
+            {"q": rows[switch].tolist(), "boxes": _boxes(keyframe)}
+            for switch, keyframe in zip(switches, result.contacts, strict=True)
+        ],
+        "path": {
+            "times": np.round(trajectory.times, _DECIMALS).tolist(),
+            "q": rows.tolist(),
+            "attachments": [vars(attachment) for attachment in trajectory.attachments],
+        },
+        "statistics": dict(statistics),
+        "verification": dict(result.verification),
+        "physics": dict(physics or {}),
+    }
+    lines = (
+        f"{json.dumps(key)}: {json.dumps(value, separators=(',', ':'), allow_nan=False)}"
+        for key, value in document.items()
+    )
+    write_text(path, "{\n" + ",\n".join(lines) + "\n}\n")
+
+
+def read_plan(path: Path) -> Plan:
+    """Read a plan.
+
+    Raises:
+        InputError: the file is missing, is not JSON, or is not a plan; the message names the
+            field and the fault.
+    """
+    document = read_json(path, "a plan as written by guided-lgp plan --out")
+    try:
+        return Plan.model_validate(document)
+    except ValidationError as error:
+        first = error.errors()[0]
+        field = ".".join(str(part) for part in first["loc"])
+        raise InputError(f"{path}: {field}" if field else str(path), first["msg"]) from None
+
+
+def _boxes(keyframe: Keyframe) -> dict[str, object]:
+    return {
+        name: {
+            "position": np.round(pose[:3], _DECIMALS).tolist(),
+            "yaw": round(float(yaw_of(pose)), _DECIMALS),
+            "quaternion": np.round(pose[3:], _DECIMALS).tolist(),
+        }
+        for name, pose in keyframe.boxes.items()
+    }

@@ -1,0 +1,48 @@
+"""Both bounds of the NLP for one scene, each verdict computed once."""
+
+from guided_lgp.bounds.coarse import CoarseBound
+from guided_lgp.bounds.path import PathBound
+from guided_lgp.bounds.results import CoarseResult, PathResult
+from guided_lgp.logic import Skeleton
+from guided_lgp.params import BoundsParams
+from guided_lgp.scene import Scene
+
+
+class SceneBounds:
+    """P_coarse and P of the skeletons of one scene (paper, eqs. 3 and 4).
+
+    The coarse bound of a skeleton starts from its prefix, and a skeleton with an infeasible prefix
+    is infeasible: its constraints contain those of the prefix. So a verdict depends only on the
+    scene and the skeleton, whoever asks first, and planners may share one instance.
+    """
+
+    def __init__(self, scene: Scene, params: BoundsParams) -> None:
+        self.scene = scene
+        self._coarse_bound = CoarseBound(scene, params.coarse_tries)
+        self._path_bound = PathBound(scene, self._coarse_bound, params.path_solutions)
+        self._coarse: dict[Skeleton, CoarseResult] = {}
+        self._path: dict[Skeleton, PathResult] = {}
+
+    def coarse(self, skeleton: Skeleton) -> CoarseResult:
+        """One verified configuration per action, or why there is none."""
+        result = self._coarse.get(skeleton)
+        if result is None:
+            prefix = self.coarse(skeleton[:-1]) if len(skeleton) > 1 else None
+            if prefix is not None and not prefix.feasible:
+                result = CoarseResult(skeleton, feasible=False, failure=prefix.failure, tries=0)
+            else:
+                result = self._coarse_bound.solve(skeleton, prefix)
+            self._coarse[skeleton] = result
+        return result
+
+    def path(self, skeleton: Skeleton) -> PathResult:
+        """The verified motion for the whole skeleton, or why there is none."""
+        result = self._path.get(skeleton)
+        if result is None:
+            coarse = self.coarse(skeleton)
+            if coarse.feasible:
+                result = self._path_bound.solve(coarse)
+            else:
+                result = PathResult(skeleton, feasible=False, failure=coarse.failure)
+            self._path[skeleton] = result
+        return result

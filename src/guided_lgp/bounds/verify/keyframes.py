@@ -1,0 +1,156 @@
+"""Verification of keyframes."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from guided_lgp.bounds.results import Array, Keyframe
+from guided_lgp.bounds.verify.geometry import (
+    Violation,
+    angle_of,
+    axes_of,
+    box_sizes,
+    declared,
+    dot,
+    grasp_faults,
+    offset_of,
+    placement_faults,
+)
+from guided_lgp.logic import Action, Skeleton, State, successor
+from guided_lgp.scene import GRIPPERS, pr2
+from guided_lgp.scene.world import World, initial_poses
+
+RIGID_POSITION, RIGID_ANGLE = 0.001, 0.01
+"""How far (m, rad) a box may slip between keyframes in what holds or supports it."""
+LIMIT_TOLERANCE = 1e-6
+
+
+def verify_keyframe(
+    world: World, keyframe: Keyframe, state: State, action: Action | None = None
+) -> list[Violation]:
+    """Check one configuration.
+
+    Args:
+        world: of the scene.
+        keyframe: arms and boxes.
+        state: who holds what and what stands where; with an action, before it.
+        action: for a contact keyframe, the action whose switch it is: the acting gripper is at
+            the box, which stands on its support. Its fingers are checked open, as they are
+            shortly before a grasp and after a place.
+
+    Returns:
+        What is violated; nothing if the keyframe is good.
+    """
+    after = state if action is None else successor(state, action)
+    held = dict(state.held) | dict(after.held)
+    support = dict(state.support) | dict(after.support)
+    sizes = box_sizes(world.scene)
+    boxes = {name: keyframe.boxes[name].tolist() for name in sizes}
+    if not math.isfinite(sum(map(sum, boxes.values()))):
+        return [Violation("finite pose", math.nan)]
+    violations = joint_limit_faults(keyframe.q)
+    fingers = {
+        gripper: pr2.finger_joint(min(sizes[box][:2]))
+        for box, gripper in held.items()
+        if action is None or box != action.box
+    }
+    world.set(keyframe.q, keyframe.boxes, fingers)
+    if held:
+        tools = world.link_poses(pr2.TOOL_LINK[gripper] for gripper in held.values()).tolist()
+        for box, tool in zip(held, tools, strict=True):
+            violations += grasp_faults(box, sizes[box], boxes[box], tool)
+    violations += placement_faults(world.scene, boxes, support)
+    violations += [
+        Violation(f"collision {overlap.first} {overlap.second}", overlap.depth)
+        for overlap in world.penetrations()
+        if not declared(overlap, held, support)
+    ]
+    return violations
+
+
+def verify_keyframes(
+    world: World,
+    skeleton: Skeleton,
+    contacts: Sequence[Keyframe],
+    retreated: Sequence[Keyframe],
+    verified: int = 0,
+) -> Violation | None:
+    """Check the keyframes of a skeleton, in the order in which they are reached.
+
+    Besides each keyframe alone: a held box is rigid in its gripper's tool frame and a standing
+    box rigid on its support, from each keyframe to the next.
+
+    Args:
+        world: of the scene.
+        skeleton: the actions.
+        contacts: one keyframe per action, at its switch.
+        retreated: one keyframe per action, after it.
+        verified: how many actions, the first ones, were checked before with these keyframes.
+
+    Returns:
+        The first violation with its action, or None.
+    """
+    state = world.scene.state
+    start = Keyframe(pr2.HOME_CONFIGURATION, initial_poses(world.scene))
+    for action in skeleton[:verified]:
+        state = successor(state, action)
+    before = retreated[verified - 1] if verified else start
+    world.set(before.q, before.boxes)
+    last = _Modes(world, before)
+    for index, action in enumerate(skeleton[verified:], verified):
+        after = successor(state, action)
+        moves = ((contacts[index], state, action), (retreated[index], after, None))
+        for keyframe, modes, contact in moves:
+            found = verify_keyframe(world, keyframe, modes, contact)
+            reached = _Modes(world, keyframe)
+            found = found or _slips(last, reached, modes)
+            if found:
+                return Violation(found[0].constraint, found[0].amount, index)
+            last = reached
+        state = after
+    return None
+
+
+def joint_limit_faults(q: Array) -> list[Violation]:
+    """Joints of a configuration (14,) outside their limits."""
+    excess = np.maximum(pr2.JOINT_LIMITS[:, 0] - q, q - pr2.JOINT_LIMITS[:, 1])
+    if not excess.max() <= LIMIT_TOLERANCE:  # also if not a number
+        return [
+            Violation(f"joint limit {pr2.ARM_JOINTS[index]}", float(excess[index]))
+            for index in range(len(excess))
+            if not excess[index] <= LIMIT_TOLERANCE
+        ]
+    return []
+
+
+class _Modes:
+    """Where boxes and tools are in a keyframe that the world has just been set to."""
+
+    def __init__(self, world: World, keyframe: Keyframe) -> None:
+        tools = world.link_poses(pr2.TOOL_LINK[gripper] for gripper in GRIPPERS).tolist()
+        self.frames: dict[str, list[float]] = dict(zip(GRIPPERS, tools, strict=True))
+        self.boxes = {name: placement.tolist() for name, placement in keyframe.boxes.items()}
+        self.frames |= self.boxes
+
+    def relative(self, box: str, carrier: str) -> tuple[list[float], list[float]]:
+        """Position of the box and cosines of its axes in the carrier's frame."""
+        placement = self.boxes[box]
+        frame = self.frames.get(carrier)
+        if frame is None:  # a table
+            return placement[:3], [c for axis in axes_of(placement) for c in axis]
+        offset, axes = offset_of(frame, placement), axes_of(frame)
+        position = [dot(offset, axis) for axis in axes]
+        return position, [dot(side, axis) for side in axes_of(placement) for axis in axes]
+
+
+def _slips(last: _Modes, reached: _Modes, state: State) -> list[Violation]:
+    """Boxes that moved relative to what holds or supports them in this mode."""
+    found = []
+    for box, carrier in (*state.held, *state.support):
+        (position, cosines), (before, were) = (m.relative(box, carrier) for m in (reached, last))
+        slip = math.dist(position, before)
+        turn = angle_of((sum(a * b for a, b in zip(cosines, were, strict=True)) - 1) / 2)
+        if slip > RIGID_POSITION or turn > RIGID_ANGLE:
+            found.append(Violation(f"rigid {box}", max(slip, turn)))
+    return found

@@ -1,5 +1,0 @@
-"""The coarse bound: one configuration per action (DESIGN §4)."""
-
-from guided_lgp.nlp.coarse.bound import CoarseBound
-
-__all__ = ["CoarseBound"]

@@ -1,5 +1,0 @@
-"""The path bound: motions for a whole skeleton."""
-
-from guided_lgp.nlp.path.bound import PathBound
-
-__all__ = ["PathBound"]

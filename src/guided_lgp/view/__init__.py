@@ -1,0 +1,1 @@
+"""Pictures of a scene, replays of a plan as a page, and the live viewer."""

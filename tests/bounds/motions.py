@@ -1,0 +1,149 @@
+"""Hand-made scenes, keyframes and motions for the tests of verification and physics."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from guided_lgp.bounds.results import Array, Attachment, Keyframe, Trajectory
+from guided_lgp.scene import Box, Scene, Table, pr2
+from guided_lgp.scene.poses import compose, inverse, pose
+from guided_lgp.scene.reach import grasp_poses, solve_arm
+from guided_lgp.scene.world import World, initial_poses
+
+SIZE = (0.15, 0.07, 0.10)
+TAB1 = Table(name="tab1", position=(0.54, 0.33, 0.60), half_extents=(0.17, 0.20))
+TAB2 = Table(name="tab2", position=(0.54, -0.33, 0.60), half_extents=(0.17, 0.20))
+FINGERS = tuple(joint for gripper in pr2.FINGER_JOINTS for joint in pr2.FINGER_JOINTS[gripper])
+OPEN, CLOSED = pr2.FINGER_LIMITS[1], pr2.finger_joint(SIZE[1])
+
+
+def scene(**boxes: tuple[float, float, float, float, str]) -> Scene:
+    """Two tables and boxes given as x, y, z (of the centre), yaw and support."""
+    return Scene(
+        tables=(TAB1, TAB2),
+        boxes=tuple(
+            Box(name=name, size=SIZE, position=(x, y, z), yaw=yaw, on=on)
+            for name, (x, y, z, yaw, on) in boxes.items()
+        ),
+    )
+
+
+def from_above(box: Box, gripper: str) -> Array:
+    """Tool pose (7,) that grasps the box from above, the hand turned the natural way."""
+    poses = list(grasp_poses(box))[:2]
+    heading = 0.3 if gripper == "pr2L" else -0.3
+    return min(poses, key=lambda p: abs(np.angle(np.exp(1j * (_closing(p) - np.pi / 2 - heading)))))
+
+
+def _closing(tool: Array) -> float:
+    tip = compose(tool, pose((0.0, 1.0, 0.0)))[:2] - tool[:2]
+    return float(np.arctan2(tip[1], tip[0]))
+
+
+_STARTS = np.array([[0.3, 0.3, 0.5, -1.5, 0.0, -1.0, 0.0], [0.3, 0.3, 1.5, -1.5, 1.0, -1.0, 1.5]])
+
+
+def reach(scene: Scene, gripper: str, tool: Array, near: Array | None = None) -> Array:
+    """Arm joints (7,) that put the tool there, near a posture where one is given."""
+    starts = [start if gripper == "pr2L" else pr2.MIRROR * start for start in _STARTS]
+    if near is not None:
+        starts.insert(0, near)
+    for start in starts:
+        found = solve_arm(scene, gripper, tool, start)
+        if found is not None:
+            return found
+    raise AssertionError(f"{gripper} does not reach {tool}")
+
+
+def with_arm(q: Array, gripper: str, arm: Array) -> Array:
+    """The configuration (14,) with one arm replaced."""
+    result = q.copy()
+    result[pr2.arm_slice(gripper)] = arm
+    return result
+
+
+def shifted(tool: Array, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Array:
+    """The pose, moved in the world."""
+    return np.concatenate([tool[:3] + np.array([x, y, z]), tool[3:]])
+
+
+@dataclass
+class Motion:
+    """A motion written down step by step, at rest after each."""
+
+    scene: Scene
+    q: Array = field(default_factory=pr2.HOME_CONFIGURATION.copy)
+    fingers: dict[str, float] = field(default_factory=lambda: {"pr2L": OPEN, "pr2R": OPEN})
+    rows: list[Array] = field(default_factory=list)
+    attachments: list[Attachment] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.rows.append(self._row())
+
+    def _row(self) -> Array:
+        return np.r_[self.q, np.full(4, self.fingers["pr2L"]), np.full(4, self.fingers["pr2R"])]
+
+    def _go(self, target: Array, steps: int = 40) -> None:
+        s = np.linspace(0, 1, steps + 1)[1:, None]
+        s = s**3 * (10 - 15 * s + 6 * s**2)
+        self.rows += list(self.rows[-1] + s * (target - self.rows[-1]))
+
+    def move(self, gripper: str, arm: Array) -> "Motion":
+        """Straight in joint space."""
+        self.q = with_arm(self.q, gripper, arm)
+        self._go(self._row())
+        return self
+
+    def hand(self, gripper: str, joint: float) -> "Motion":
+        """Open or close the fingers."""
+        self.fingers = self.fingers | {gripper: joint}
+        self._go(self._row(), 20)
+        return self
+
+    def attach(self, box: str, gripper: str) -> "Motion":
+        """From here on the box is rigid in the gripper."""
+        self.attachments.append(Attachment(box, gripper, len(self.rows) - 1, -1))
+        return self
+
+    def release(self, box: str) -> "Motion":
+        """Until here the box was rigid in its gripper."""
+        self.attachments = [
+            replace(a, end=len(self.rows) - 1) if a.box == box and a.end < 0 else a
+            for a in self.attachments
+        ]
+        return self
+
+    def trajectory(self, period: float = 0.08) -> Trajectory:
+        """Samples at equal times."""
+        last = len(self.rows) - 1
+        return Trajectory(
+            (*pr2.ARM_JOINTS, *FINGERS),
+            period * np.arange(len(self.rows)),
+            np.array(self.rows),
+            tuple(replace(a, end=last) if a.end < 0 else a for a in self.attachments),
+        )
+
+
+def grasp(motion: Motion, gripper: str, box: str) -> Array:
+    """Approach from above, close, lift; returns the grip: the box (7,) in the tool frame."""
+    body = next(b for b in motion.scene.boxes if b.name == box)
+    tool = from_above(body, gripper)
+    at = reach(motion.scene, gripper, tool)
+    above = reach(motion.scene, gripper, shifted(tool, z=0.10), at)
+    motion.move(gripper, above).move(gripper, at).hand(gripper, CLOSED).attach(box, gripper)
+    motion.move(gripper, above)
+    return compose(inverse(tool), pose(body.position, body.yaw))
+
+
+def place(motion: Motion, gripper: str, box: str, grip: Array, target: Array) -> None:
+    """Put a held box to a pose (7,) from above, open, retreat and go home."""
+    tool = compose(target, inverse(grip))
+    at = reach(motion.scene, gripper, tool)
+    above = reach(motion.scene, gripper, shifted(tool, z=0.10), at)
+    motion.move(gripper, above).move(gripper, at).release(box).hand(gripper, OPEN)
+    motion.move(gripper, above).move(gripper, pr2.HOME[gripper])
+
+
+def keyframe(world: World, q: Array, **boxes: Array) -> Keyframe:
+    """A keyframe with the boxes where the scene has them, except those given."""
+    return Keyframe(q, initial_poses(world.scene) | boxes)

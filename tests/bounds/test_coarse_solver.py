@@ -1,0 +1,130 @@
+"""The kernels' derivatives, the two solvers, and the compilation."""
+
+import logging
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from guided_lgp.bounds.coarse import compiler, solver
+from guided_lgp.bounds.coarse.formulation import Formulator, Margins, SceneGeometry
+from guided_lgp.bounds.coarse.kernels import Kernel, kernels
+from guided_lgp.bounds.coarse.solver import Compiled, Interpreter, Settings
+from guided_lgp.bounds.coarse.starts import Starts
+from guided_lgp.errors import InputError
+from guided_lgp.logic import parse_skeleton
+from guided_lgp.scene import generate, pr2
+
+
+def _compiled() -> Compiled:
+    library = compiler.load_library()
+    assert library is not None
+    return Compiled(library)
+
+
+@pytest.mark.parametrize("kernel", kernels(), ids=lambda kernel: kernel.name)
+def test_jacobians_agree_with_finite_differences(kernel: Kernel) -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        x = rng.uniform(-1, 1, kernel.inputs)
+        p = rng.uniform(0.1, 0.5, kernel.parameters)
+        c, transposed = (np.array(part) for part in kernel.jacobian(x, p))
+        assert c.ravel() == pytest.approx(np.array(kernel.residual(x, p)).ravel())
+        for j, unit in enumerate(np.eye(kernel.inputs)):
+            ahead, behind = (np.array(kernel.residual(x + h * unit, p)) for h in (1e-6, -1e-6))
+            expected = (ahead - behind).ravel() / 2e-6
+            assert transposed[j] == pytest.approx(expected, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    "skeleton",
+    [
+        "(grasp pr2L red) (place pr2L red tab1)",
+        "(grasp pr2L red) (place pr2L red green) (grasp pr2R green)",
+        "(grasp pr2L red) (grasp pr2R blue) (place pr2R blue red)",
+    ],
+)
+def test_compiled_and_interpreted_loops_agree(skeleton: str) -> None:
+    scene = generate("a", 1, 11, "x").scenes[0]
+    geometry, settings = SceneGeometry(scene), Settings(steps=12)
+    formulation = Formulator(geometry, Margins()).build(parse_skeleton(skeleton))
+    fast, slow = _compiled(), Interpreter()
+    rng = np.random.default_rng(3)
+    start = Starts(geometry, fast).draw(formulation, rng, noise=0.3)
+    one = fast.solve(formulation.program, start, settings)
+    other = slow.solve(formulation.program, start, settings)
+    assert one.steps == other.steps
+    assert one.violation == pytest.approx(other.violation, abs=1e-7)
+    assert one.values == pytest.approx(other.values, abs=1e-6)
+    arguments = rng.uniform(-0.5, 0.5, (20, 15))
+    assert fast.reach(arguments) == pytest.approx(slow.reach(arguments), abs=1e-9)
+
+
+def test_variables_stay_within_their_bounds() -> None:
+    scene = generate("a", 1, 12, "x").scenes[0]
+    geometry = SceneGeometry(scene)
+    formulation = Formulator(geometry, Margins()).build(parse_skeleton("(grasp pr2R red)"))
+    program = formulation.program
+    start = np.concatenate([program.target, formulation.constants])
+    values = _compiled().solve(program, start, Settings()).values[: program.variables]
+    assert np.all(values >= program.lower)
+    assert np.all(values <= program.upper)
+
+
+# One line per compilation; takes a while, as a compiler does.
+COMPILER = """#!/bin/sh
+echo compiled >> {log}
+while [ "$1" != -o ]; do shift; done
+sleep 1
+cp {library} "$2"
+"""
+
+
+def test_of_two_processes_one_compiles_and_the_other_waits(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    assert compiler.load_library() is not None
+    library = next(compiler.cache_folder().glob("coarse-*.so"))
+    stand_in = tmp_path / "bin" / "cc"
+    stand_in.parent.mkdir()
+    stand_in.write_text(COMPILER.format(log=tmp_path / "log", library=library))
+    stand_in.chmod(0o755)
+    monkeypatch.setenv("PATH", str(stand_in.parent), prepend=":")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    code = "from guided_lgp.bounds.coarse.compiler import load_library; assert load_library()"
+    both = [subprocess.Popen([sys.executable, "-c", code]) for _ in range(2)]
+    assert [process.wait(60) for process in both] == [0, 0]
+    assert compiler.load_library() is not None
+    assert (tmp_path / "log").read_text().count("compiled") == 1
+    assert not list((tmp_path / "cache" / "guided-lgp").glob("tmp*"))
+
+
+def test_a_cache_folder_that_cannot_be_written_is_named(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    description = pr2.urdf_path()
+    monkeypatch.setattr(pr2, "urdf_path", lambda: description)
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    with pytest.raises(InputError, match=r"guided-lgp: .*XDG_CACHE_HOME"):
+        compiler.load_library()
+
+
+def test_without_a_compiler_the_interpreter_takes_over_and_says_so_once(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    description = pr2.urdf_path()
+    monkeypatch.setattr(pr2, "urdf_path", lambda: description)
+    monkeypatch.setattr(compiler, "find_spec", lambda name: None)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    solver.default_solver.cache_clear()
+    try:
+        with caplog.at_level(logging.WARNING):
+            assert isinstance(solver.default_solver(), Interpreter)
+            solver.default_solver()
+        assert [record.message.count("no C compiler") for record in caplog.records] == [1]
+    finally:
+        solver.default_solver.cache_clear()

@@ -1,0 +1,112 @@
+"""Plans carried out under gravity: goals are read from the settled world, nothing is teleported."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from motions import CLOSED, Motion, from_above, grasp, place, reach, scene, shifted
+
+from guided_lgp.bounds.execution import execute
+from guided_lgp.bounds.results import Trajectory
+from guided_lgp.logic import parse_objective, parse_skeleton
+from guided_lgp.scene import Scene, pr2
+from guided_lgp.scene.poses import compose, pose
+from guided_lgp.scene.reach import grasp_poses
+
+STACK = parse_skeleton("(grasp pr2L red) (place pr2L red green)")
+STACKED = parse_objective(["(on red green)", "(on green tab1)"])
+PERIOD = 0.05
+
+
+@pytest.fixture(scope="module")
+def neighbours() -> Scene:
+    return scene(red=(0.52, 0.30, 0.65, 0.2, "tab1"), green=(0.50, 0.44, 0.65, 0.1, "tab1"))
+
+
+@pytest.fixture(scope="module")
+def stacking(neighbours: Scene) -> Trajectory:
+    motion = Motion(neighbours)
+    grip = grasp(motion, "pr2L", "red")
+    place(motion, "pr2L", "red", grip, pose((0.50, 0.44, 0.75), 0.1))
+    return motion.trajectory(PERIOD)
+
+
+def test_box_is_stacked(neighbours: Scene, stacking: Trajectory) -> None:
+    report = execute(neighbours, STACKED, STACK, stacking)
+    assert report.success
+    assert report.goals == {"(on red green)": True, "(on green tab1)": True}
+    assert report.drift < 0.002
+
+
+def test_box_is_held(neighbours: Scene) -> None:
+    motion = Motion(neighbours)
+    grasp(motion, "pr2L", "red")
+    motion.move("pr2L", pr2.HOME["pr2L"])
+    objective = parse_objective(["(held red)", "(on green tab1)", "(on red tab1)"])
+    report = execute(neighbours, objective, STACK[:1], motion.trajectory(PERIOD))
+    assert report.goals == {"(held red)": True, "(on green tab1)": True, "(on red tab1)": False}
+    assert not report.success
+
+
+def test_box_let_go_beside_its_support_falls(neighbours: Scene, stacking: Trajectory) -> None:
+    """The attachment ends where the box is still high above the table."""
+    (attachment,) = stacking.attachments
+    early = (replace(attachment, end=attachment.start + 45),)
+    report = execute(neighbours, STACKED, STACK, replace(stacking, attachments=early))
+    assert not report.goals["(on red green)"]
+    assert report.drift > 0.05
+
+
+def test_gripper_that_is_not_at_the_box_grasps_nothing(neighbours: Scene) -> None:
+    above = shifted(from_above(neighbours.boxes[0], "pr2L"), z=0.10)
+    motion = Motion(neighbours).move("pr2L", reach(neighbours, "pr2L", above))
+    motion.hand("pr2L", CLOSED).attach("red", "pr2L").move("pr2L", pr2.HOME["pr2L"])
+    objective = parse_objective(["(held red)"])
+    report = execute(neighbours, objective, STACK[:1], motion.trajectory(PERIOD))
+    assert not report.success
+    assert report.fault == "grasp red"
+
+
+def test_box_in_the_way_is_pushed(neighbours: Scene) -> None:
+    """Nothing keeps a hand that sweeps over the table from moving what stands there."""
+    beside = shifted(from_above(neighbours.boxes[0], "pr2L"), y=-0.14)
+    motion = Motion(neighbours).move("pr2L", reach(neighbours, "pr2L", shifted(beside, z=0.15)))
+    motion.move("pr2L", reach(neighbours, "pr2L", beside, motion.q[:7]))
+    swept = shifted(beside, y=0.12)
+    motion.move("pr2L", reach(neighbours, "pr2L", swept, motion.q[:7]))
+    report = execute(neighbours, (), (), motion.trajectory(PERIOD))
+    assert report.drift > 0.02
+
+
+def test_plan_that_is_not_of_the_skeleton_is_not_executed(
+    neighbours: Scene, stacking: Trajectory
+) -> None:
+    report = execute(neighbours, STACKED, STACK, replace(stacking, attachments=()))
+    assert not report.success
+    assert report.fault == "attachments"
+
+
+@pytest.mark.parametrize(("period", "stays"), [(0.08, True), (0.006, False)])
+def test_box_on_a_held_box_rides_by_friction_alone(period: float, stays: bool) -> None:
+    """Carried gently it stays where it is, jerked away it falls."""
+    stacked = scene(red=(0.52, 0.30, 0.65, 0.2, "tab1"), green=(0.52, 0.30, 0.75, 1.77, "red"))
+    box = stacked.boxes[0]
+    tool = next(t for t in grasp_poses(box) if compose(t, pose((1, 0, 0)))[2] - t[2] > -0.01)
+    back = compose(tool, pose((-0.10, 0, 0)))
+    at = reach(stacked, "pr2L", tool)
+    away = reach(stacked, "pr2L", back, at)
+    above = reach(stacked, "pr2L", shifted(back, z=0.20), away)
+    lifted = reach(stacked, "pr2L", shifted(tool, z=0.10), at)
+    aside = reach(stacked, "pr2L", shifted(tool, y=0.20, z=0.10), lifted)
+    motion = Motion(stacked).move("pr2L", above).move("pr2L", away).move("pr2L", at)
+    motion.hand("pr2L", CLOSED).attach("red", "pr2L").attach("green", "pr2L")
+    motion.move("pr2L", lifted)
+    slow = motion.trajectory(0.05)
+    motion.move("pr2L", aside).move("pr2L", lifted).move("pr2L", aside)
+    path = motion.trajectory(period)
+    rows = len(slow.times)
+    times = np.r_[slow.times, slow.times[-1] + path.times[1 : len(path.times) - rows + 1]]
+    objective = parse_objective(["(held red)", "(on green red)"])
+    skeleton = parse_skeleton("(grasp pr2L red)")
+    report = execute(stacked, objective, skeleton, replace(path, times=times))
+    assert report.goals["(on green red)"] is stays

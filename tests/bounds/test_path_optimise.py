@@ -1,0 +1,132 @@
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from motions import scene
+
+from guided_lgp.bounds.path.collision import Mode
+from guided_lgp.bounds.path.motions import Free, Motion, Mover, Still
+from guided_lgp.bounds.path.optimise import LEVEL, optimise
+from guided_lgp.bounds.path.situation import Fingers
+from guided_lgp.bounds.results import Array
+from guided_lgp.scene import GRIPPERS
+from guided_lgp.scene.poses import pose
+from guided_lgp.scene.pr2 import FINGER_LIMITS, HOME, HOME_CONFIGURATION, VELOCITY_LIMITS
+from guided_lgp.scene.world import initial_poses
+
+SCENE = scene(red=(0.47, 0.2, 0.65, 0.2, "tab1"), green=(0.6, 0.4, 0.65, -0.4, "tab1"))
+FINGERS = dict.fromkeys(GRIPPERS, FINGER_LIMITS[1])
+AHEAD = np.array([0.2, 0.3, 0.9, -1.6, 0.4, -1.0, 0.3])
+ASIDE = np.array([1.2, -0.2, 1.4, -1.9, 0.9, -1.5, -0.8])
+
+
+@pytest.fixture(scope="module")
+def mover() -> Mover:
+    return Mover(SCENE, 150)
+
+
+def still(gripper: str = "pr2L", **boxes: Array) -> Still:
+    return Still(Mode(gripper, initial_poses(SCENE) | boxes), HOME_CONFIGURATION, FINGERS)
+
+
+def straight(*corners: Array) -> Array:
+    parts = [np.linspace(a, b, 40)[1:] for a, b in pairwise(corners)]
+    return np.concatenate([corners[0][None], *parts])
+
+
+def length(path: Array) -> float:
+    return float(np.linalg.norm(np.diff(path, axis=0) / VELOCITY_LIMITS[:7], axis=1).sum())
+
+
+def duration(*motions: Motion) -> float:
+    return float(sum(motion.timed[0][-1] for motion in motions))
+
+
+def free_motion(path: Array, surroundings: Still, level: bool = False) -> Motion:
+    return Motion(surroundings.mode.gripper, path, Free(surroundings, level))
+
+
+@pytest.mark.parametrize("gripper", GRIPPERS)
+def test_detour_becomes_short_and_smooth(mover: Mover, gripper: str) -> None:
+    mirror = mover.arms[gripper].sign
+    detour = straight(HOME[gripper], mirror * ASIDE, mirror * AHEAD)
+    slow = free_motion(detour, still(gripper))
+    (fast,) = optimise(mover, [slow])
+    assert isinstance(fast, Motion)
+    assert np.array_equal(fast.path[[0, -1]], detour[[0, -1]])
+    assert mover.collision(still(gripper), fast.path) is None
+    assert length(fast.path) < 1.05 * length(detour[[0, -1]])
+    assert duration(fast) < 0.8 * duration(slow)
+
+
+def test_keeps_clear_of_what_is_in_the_way(mover: Mover) -> None:
+    """A box hangs where the hand would pass on the direct way: the detour is only shortened."""
+    _, middle = mover.arms["pr2L"].forward((HOME["pr2L"] + AHEAD) / 2)
+    around = still(green=pose(tuple(middle)))
+    assert mover.collision(around, straight(HOME["pr2L"], AHEAD)) is not None
+    found = mover.transit(around, HOME["pr2L"], AHEAD, np.random.default_rng(0))
+    assert found is not None
+    slow = [free_motion(path, around) for path in found]
+    (fast,) = optimise(mover, slow)
+    assert isinstance(fast, Motion)
+    assert mover.collision(around, fast.path) is None
+    assert duration(fast) < 0.9 * duration(*slow)
+
+
+def test_goes_on_into_a_straight_line_without_a_rest(mover: Mover) -> None:
+    arm, side = mover.arms["pr2L"], mover.side("pr2L", AHEAD)
+    rotation, position = arm.forward(AHEAD)
+    ahead = 0.09 * rotation[:, 0]
+    path = mover.line(still(), (rotation, position), ahead, (AHEAD[0], AHEAD[0]), side)
+    assert isinstance(path, np.ndarray), path
+    line = Motion("pr2L", path)
+    come = free_motion(straight(HOME["pr2L"], AHEAD), still())
+    (joined,) = optimise(mover, [come, line])
+    assert isinstance(joined, Motion)
+    assert joined.free is None
+    assert np.array_equal(joined.path[1 - len(path) :], line.path[1:])
+    steps = np.diff(joined.path, axis=0)
+    directions = steps / np.linalg.norm(steps, axis=1, keepdims=True)
+    assert np.sum(directions[1:] * directions[:-1], axis=1).min() > 0.97  # no corner
+    assert duration(joined) < duration(come, line)
+
+
+def test_other_steps_stay_where_they_are(mover: Mover) -> None:
+    come = free_motion(straight(HOME["pr2L"], ASIDE), still())
+    go = free_motion(straight(ASIDE, HOME["pr2L"]), still())
+    close = Fingers("pr2L", 0.1)
+    first, second, third = optimise(mover, [come, close, go])
+    assert second is close
+    assert isinstance(first, Motion)
+    assert isinstance(third, Motion)
+    assert np.array_equal(first.path[-1], ASIDE)
+    assert np.array_equal(third.path[0], ASIDE)
+
+
+def test_level_motion_stays_level(mover: Mover) -> None:
+    arm = mover.arms["pr2L"]
+    rotation, position = arm.forward(AHEAD)
+    ways = position + np.array([[0, 0, 0], [0.0, 0.2, 0.1], [-0.1, 0.1, 0.1]])
+    _, valid = arm.inverse(rotation, ways, np.full(3, AHEAD[0]))
+    side = mover.side("pr2L", AHEAD)
+    assert valid[:, side].all()
+    legs = [
+        mover.line(still(), (rotation, a), b - a, (AHEAD[0], AHEAD[0]), side)
+        for a, b in pairwise(ways)
+    ]
+    slow = [free_motion(np.asarray(leg), still(), level=True) for leg in legs]
+    (fast,) = optimise(mover, slow)
+    assert isinstance(fast, Motion)
+    assert duration(fast) < duration(*slow)
+    vertical = arm.forward(fast.path)[0][:, 2]
+    assert np.abs(vertical - rotation[2]).max() < LEVEL
+
+
+def test_stays_as_it_is_where_nothing_is_gained(mover: Mover) -> None:
+    direct = free_motion(straight(HOME["pr2L"], ASIDE), still())
+    again = optimise(mover, optimise(mover, [direct]))
+    (best,) = again
+    assert isinstance(best, Motion)
+    assert duration(best) <= duration(direct)
+    inside = free_motion(direct.path, still(red=pose(tuple(mover.arms["pr2L"].forward(ASIDE)[1]))))
+    assert optimise(mover, [inside]) == [inside]

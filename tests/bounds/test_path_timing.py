@@ -1,0 +1,44 @@
+import numpy as np
+import pytest
+
+from guided_lgp.bounds.path.timing import INTERVAL, time_path
+from guided_lgp.scene.pr2 import ACCELERATION_LIMITS, HOME, VELOCITY_LIMITS
+
+ENDS = np.stack([HOME["pr2L"], HOME["pr2L"] + [-1.0, 0.4, 0.5, -0.3, 2.0, -0.3, -2.5]])
+
+
+def _curved() -> np.ndarray:
+    path = np.linspace(*ENDS, 30)
+    path[:, 2] += 0.3 * np.sin(np.linspace(0, 3 * np.pi, 30))
+    return path
+
+
+@pytest.mark.parametrize("path", [ENDS, _curved()], ids=["line", "curve"])
+def test_limits_hold_from_rest_to_rest(path: np.ndarray) -> None:
+    times, rows = time_path(path, "pr2L")
+    steps = np.diff(times)
+    assert steps.min() > 0
+    assert rows[0] == pytest.approx(path[0])
+    assert rows[-1] == pytest.approx(path[-1])
+    rates = np.diff(rows, axis=0) / steps[:, None]
+    changes = np.diff(np.vstack([np.zeros(7), rates, np.zeros(7)]), axis=0) / steps[0]
+    assert np.all(np.abs(rates) <= VELOCITY_LIMITS[:7])
+    assert np.all(np.abs(changes[1:-1]) <= ACCELERATION_LIMITS[:7])
+    assert np.all(2 * np.abs(changes[[0, -1]]) <= ACCELERATION_LIMITS[:7])
+
+
+def test_a_long_line_is_near_the_time_optimum() -> None:
+    times, _ = time_path(ENDS, "pr2L")
+    turn = np.abs(ENDS[1] - ENDS[0])
+    top, gain = VELOCITY_LIMITS[:7], ACCELERATION_LIMITS[:7]
+    optimum = np.where(
+        turn > top**2 / gain, turn / top + top / gain, 2 * np.sqrt(turn / gain)
+    ).max()
+    assert optimum <= times[-1] <= 1.1 * optimum
+    assert np.diff(times).max() <= 1.1 * INTERVAL
+
+
+def test_no_motion_takes_no_time() -> None:
+    times, rows = time_path(np.stack([HOME["pr2L"], HOME["pr2L"]]), "pr2L")
+    assert times.tolist() == [0.0]
+    assert rows.shape == (1, 7)

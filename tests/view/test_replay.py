@@ -1,0 +1,103 @@
+import re
+from itertools import combinations
+from pathlib import Path
+from threading import Event, Thread
+from urllib.request import urlopen
+
+import numpy as np
+import outputs
+import pytest
+
+from guided_lgp.errors import InputError
+from guided_lgp.scene import Scene, generate
+from guided_lgp.scene.poses import compose, inverse, pose
+from guided_lgp.scene.pr2 import ARM_JOINTS, tool_pose
+from guided_lgp.scene.world import COLOURS
+from guided_lgp.view.live import view
+from guided_lgp.view.replay import play, replay_html
+from guided_lgp.view.viewer import Viewer, box_colours
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return generate("a", 1, 0, "<b>scene").scenes[0]
+
+
+def test_tool_pose_agrees_with_the_kinematics(scene: Scene) -> None:
+    q = outputs.motion("red").q[25]
+    with Viewer(scene) as viewer:
+        viewer.configure(dict(zip(ARM_JOINTS, q, strict=True)))
+        for gripper in ("pr2L", "pr2R"):
+            assert np.allclose(viewer.tool_pose(gripper), tool_pose(scene, q, gripper), atol=1e-9)
+
+
+def test_an_attached_box_follows_the_tool_and_stays_where_it_is_left(scene: Scene) -> None:
+    name = scene.boxes[0].name
+    trajectory = outputs.motion(name)
+    (carried,) = trajectory.attachments
+    start = pose(scene.boxes[0].position, scene.boxes[0].yaw)
+    grasp = compose(inverse(tool_pose(scene, trajectory.q[carried.start], "pr2L")), start)
+    end = compose(tool_pose(scene, trajectory.q[carried.end], "pr2L"), grasp)
+    assert np.linalg.norm(end[:3] - start[:3]) > 0.1
+    with Viewer(scene) as viewer:
+        total = sum(play(viewer, trajectory))
+        shown = viewer.server.scene.get_handle_by_name(f"/boxes/{name}")
+        assert shown is not None
+        assert np.allclose(shown.position, end[:3], atol=1e-4)
+    assert total == pytest.approx(trajectory.times[-1])
+
+
+def test_page_is_self_contained_deterministic_and_escaped(scene: Scene, tmp_path: Path) -> None:
+    trajectory = outputs.motion(scene.boxes[0].name)
+    pages = [tmp_path / "deep" / name for name in ("one.html", "two.html")]
+    for page in pages:
+        replay_html(trajectory, scene, page)
+    text = pages[0].read_text(encoding="utf-8")
+    assert pages[1].read_text(encoding="utf-8") == text
+    assert len(text) < 2_000_000
+    assert "<title>Replay: &lt;b&gt;scene" in text
+    head = re.sub(r'"[A-Za-z0-9+/=]{1000,}"', "", text)
+    assert not re.search(r"<(script|link|img)[^>]+(src|href)=[\"']?(https?:|//)", head)
+
+
+def test_a_full_disk_leaves_no_page(scene: Scene, tmp_path: Path) -> None:
+    (tmp_path / ".unfinished-page.html").symlink_to("/dev/full")
+    with pytest.raises(InputError, match="No space left on device"):
+        replay_html(outputs.motion(scene.boxes[0].name), scene, tmp_path / "page.html")
+    assert list(tmp_path.iterdir()) == []
+
+
+def named(scene: Scene, *names: str) -> Scene:
+    """The scene with copies of its first box under these names."""
+    boxes = tuple(scene.boxes[0].model_copy(update={"name": name}) for name in names)
+    return scene.model_copy(update={"boxes": boxes})
+
+
+def test_boxes_are_told_apart_by_colour(scene: Scene) -> None:
+    mug, red, jar = box_colours(named(scene, "mug", "red", "jar"))
+    assert red == COLOURS["red"]
+    assert box_colours(named(scene, "mug", "blue", "tin")) == [mug, COLOURS["blue"], jar]
+    ten = box_colours(named(scene, *(f"box{number}" for number in range(10))))
+    assert ten[:2] == [mug, jar]
+    assert min(np.linalg.norm(np.subtract(a, b)) for a, b in combinations(ten, 2)) > 0.1
+
+
+def test_live_view_serves_the_loopback_interface_until_stopped(scene: Scene) -> None:
+    stop, ready, addresses = Event(), Event(), []
+
+    def announce(address: str) -> None:
+        addresses.append(address)
+        ready.set()
+
+    thread = Thread(target=view, args=(scene, outputs.motion("red"), 8150, announce, stop))
+    thread.start()
+    try:
+        assert ready.wait(30)
+        (address,) = addresses
+        assert address.startswith("http://127.0.0.1:")
+        with urlopen(address, timeout=10) as answer:
+            assert answer.status == 200
+    finally:
+        stop.set()
+        thread.join(30)
+    assert not thread.is_alive()
