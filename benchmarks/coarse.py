@@ -86,7 +86,7 @@ def run_task(task: Task) -> dict[str, Any]:
         "n": count,
         "coarse_median_ms": median(times) * 1e3,
         "coarse_verified_median_ms": median(s.result.time_s for s in solved) * 1e3,
-        "coarse_first_try": fmean(sequence.result.tries == 1 for sequence in solved),
+        "coarse_first_try": fmean(sequence.result.restarts == 1 for sequence in solved),
         "false_infeasible": 1 - len(solved) / possible,
         "infeasible_share": 1 - len(solved) / count,
         "ipopt": _against_ipopt(solved[:: ceil(len(solved) / PROGRAMS_FOR_IPOPT[length])]),

@@ -31,7 +31,7 @@ class Verdicts:
 
     def coarse(self, skeleton: Skeleton) -> CoarseResult:
         failure = self._coarse.get(skeleton)
-        return CoarseResult(skeleton, failure is None, failure=failure, tries=3)
+        return CoarseResult(skeleton, failure is None, failure=failure, restarts=3)
 
     def path(self, skeleton: Skeleton) -> PathResult:
         failure = self._path.get(skeleton)

@@ -67,7 +67,7 @@ class ObservedBounds:
     @property
     def starts(self) -> int:
         """Starts of the coarse solver, over all sequences."""
-        return sum(result.tries for result in self._coarse.values())
+        return sum(result.restarts for result in self._coarse.values())
 
     def obstacles(self, start: State, objective: Objective) -> tuple[Obstacle, ...]:
         """What stopped the sequences; first what is nearest to the objective.

@@ -49,9 +49,9 @@ def _random_skeletons(scene: Scene, length: int, count: int, seed: int) -> list[
 def _assert_true(scene: Scene, result: CoarseResult) -> None:
     """Check a feasible verdict in a world of its own."""
     assert result.feasible, str(result.failure)
-    assert len(result.contacts) == len(result.retreated) == len(result.skeleton)
+    assert len(result.at_switch) == len(result.after_action) == len(result.skeleton)
     with World(scene) as world:
-        fault = verify_keyframes(world, result.skeleton, result.contacts, result.retreated)
+        fault = verify_keyframes(world, result.skeleton, result.at_switch, result.after_action)
     assert fault is None, str(fault)
 
 
@@ -94,27 +94,27 @@ def test_random_verdicts_are_true_in_every_setup() -> None:
 
 def test_the_acting_arm_retreats_to_its_side(bound: CoarseBound) -> None:
     result = bound.solve(parse_skeleton("(grasp pr2L red) (place pr2L red tab1)"))
-    for keyframe in result.retreated:
+    for keyframe in result.after_action:
         assert np.array_equal(keyframe.q, pr2.HOME_CONFIGURATION)
-    assert result.retreated[0].boxes["red"][2] > 0.9  # at the hand, not on the table
-    assert result.retreated[1].boxes["red"] == pytest.approx(result.contacts[1].boxes["red"])
+    assert result.after_action[0].boxes["red"][2] > 0.9  # at the hand, not on the table
+    assert result.after_action[1].boxes["red"] == pytest.approx(result.at_switch[1].boxes["red"])
 
 
 def test_an_arm_whose_box_carries_another_stays_level(bound: CoarseBound) -> None:
     lifted = bound.solve(
         parse_skeleton("(grasp pr2L green) (place pr2L green red) (grasp pr2L red)")
     )
-    contact, retreated = lifted.contacts[-1], lifted.retreated[-1]
-    assert not np.allclose(retreated.q[:7], pr2.HOME["pr2L"])
+    contact, lifted_away = lifted.at_switch[-1], lifted.after_action[-1]
+    assert not np.allclose(lifted_away.q[:7], pr2.HOME["pr2L"])
     for box in ("red", "green"):
-        rise = retreated.boxes[box] - contact.boxes[box]
+        rise = lifted_away.boxes[box] - contact.boxes[box]
         assert rise == pytest.approx([0, 0, 0.08, 0, 0, 0, 0], abs=1e-9)
 
     text = "(grasp pr2L red) (grasp pr2R blue) (place pr2R blue red) (grasp pr2R blue)"
     presented = bound.solve(parse_skeleton(text))
-    _, before, carrying, emptied = presented.retreated
+    _, before, carrying, emptied = presented.after_action
     assert np.array_equal(before.q, pr2.HOME_CONFIGURATION)
-    assert np.array_equal(carrying.q[:7], presented.contacts[2].q[:7])
+    assert np.array_equal(carrying.q[:7], presented.at_switch[2].q[:7])
     assert float(tilt(carrying.boxes["red"])) == pytest.approx(0, abs=1e-6)
     assert np.array_equal(emptied.q, pr2.HOME_CONFIGURATION)
 
@@ -170,8 +170,8 @@ def test_a_verdict_depends_on_scene_and_skeleton_only(bound: CoarseBound) -> Non
         prefix = bound.solve(skeleton[:-1])
         for again in (bound.solve(skeleton, prefix), bound.solve(skeleton)):
             assert again.feasible == fresh.feasible
-            assert again.tries == fresh.tries or not fresh.feasible
-            for one, other in zip(again.contacts, fresh.contacts, strict=True):
+            assert again.restarts == fresh.restarts or not fresh.feasible
+            for one, other in zip(again.at_switch, fresh.at_switch, strict=True):
                 assert np.array_equal(one.q, other.q)
 
 
@@ -205,11 +205,11 @@ def test_further_solutions_are_distinct_and_true(bound: CoarseBound) -> None:
     assert len(results) == 4
     for result in results:
         _assert_true(SCENE, result)
-    poses = {tuple(np.round(r.contacts[1].boxes["red"], 4)) for r in results}
+    poses = {tuple(np.round(r.at_switch[1].boxes["red"], 4)) for r in results}
     assert len(poses) == 4
     again = list(bound.solutions(skeleton, 4))
     assert all(
-        np.array_equal(one.contacts[1].q, other.contacts[1].q)
+        np.array_equal(one.at_switch[1].q, other.at_switch[1].q)
         for one, other in zip(results, again, strict=True)
     )
 
@@ -231,8 +231,8 @@ def test_carried_boxes_move_along(bound: CoarseBound) -> None:
     text = "(grasp pr2L green) (place pr2L green red) (grasp pr2L red) (place pr2L red tab1)"
     result = bound.solve(parse_skeleton(text))
     assert progress(SCENE.state, result.skeleton).support_of("green") == "red"
-    final = result.retreated[-1].boxes
+    final = result.after_action[-1].boxes
     assert final["green"][2] - final["red"][2] == pytest.approx(0.10, abs=1e-6)
-    before = result.retreated[1].boxes
+    before = result.after_action[1].boxes
     distances = [np.linalg.norm(boxes["green"][:2] - boxes["red"][:2]) for boxes in (before, final)]
     assert distances[0] == pytest.approx(distances[1], abs=1e-3)

@@ -52,7 +52,7 @@ def _solve(bound: PathBound, coarse: CoarseBound, text: str) -> PathResult:
 def test_motion_passes_verification(bound: PathBound, coarse: CoarseBound, text: str) -> None:
     result = _solve(bound, coarse, text)
     assert result.trajectory is not None
-    assert len(result.contacts) == len(result.skeleton)
+    assert len(result.at_switch) == len(result.skeleton)
     with World(SCENE) as world:
         report = verify_path(world, result.skeleton, result.trajectory)
     assert report.violation is None
@@ -105,10 +105,10 @@ class _Only(CoarseBound):
 def _moved(
     result: CoarseResult, action: int, box: str, where: tuple[float, float, float]
 ) -> CoarseResult:
-    contacts = list(result.contacts)
-    boxes = {**contacts[action].boxes, box: pose(where)}
-    contacts[action] = Keyframe(contacts[action].q, boxes)
-    return replace(result, contacts=tuple(contacts))
+    at_switch = list(result.at_switch)
+    boxes = {**at_switch[action].boxes, box: pose(where)}
+    at_switch[action] = Keyframe(at_switch[action].q, boxes)
+    return replace(result, at_switch=tuple(at_switch))
 
 
 def test_a_place_in_the_way_is_chosen_anew() -> None:
@@ -117,7 +117,7 @@ def test_a_place_in_the_way_is_chosen_anew() -> None:
     on_green = _moved(start, 1, "red", (0.6, 0.4, 0.65))
     result = PathBound(SCENE, coarse, 1).solve(on_green)
     assert result.feasible, result.failure
-    placed = result.contacts[1].boxes["red"]
+    placed = result.at_switch[1].boxes["red"]
     assert np.linalg.norm(placed[:2] - [0.6, 0.4]) > 0.07
     final = progress(SCENE.state, result.skeleton)
     assert final.satisfies(Goal("on", "red", "tab1"))

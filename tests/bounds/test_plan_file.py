@@ -53,7 +53,7 @@ def test_keyframes_are_rows_of_the_path(file: Path, result: PathResult) -> None:
     (keyframe,) = plan.keyframes
     (attachment,) = plan.path.attachments
     assert keyframe.q == plan.path.q[attachment.start]
-    assert keyframe.q[:14] == pytest.approx(result.contacts[0].q, abs=1e-6)
+    assert keyframe.q[:14] == pytest.approx(result.at_switch[0].q, abs=1e-6)
     red = keyframe.boxes["red"]
     assert red.position == pytest.approx((0.5, 0.3, 0.65), abs=1e-6)
     assert red.yaw == pytest.approx(0.3, abs=1e-6)

@@ -212,8 +212,8 @@ def frames(two_boxes: Scene, at_red: Array) -> tuple[list[Keyframe], list[Keyfra
     carried = boxes | {"red": compose(pr2.tool_pose(two_boxes, HOME, "pr2L"), grip)}
     moved = boxes | {"red": shifted(boxes["red"], y=0.1)}
     placing = reach(two_boxes, "pr2L", shifted(tool, y=0.1))
-    contacts = [Keyframe(at_red, boxes), Keyframe(with_arm(HOME, "pr2L", placing), moved)]
-    return contacts, [Keyframe(HOME, carried), Keyframe(HOME, moved)]
+    at_switch = [Keyframe(at_red, boxes), Keyframe(with_arm(HOME, "pr2L", placing), moved)]
+    return at_switch, [Keyframe(HOME, carried), Keyframe(HOME, moved)]
 
 
 def test_good_keyframes(world: World, frames: tuple[list[Keyframe], list[Keyframe]]) -> None:
@@ -223,9 +223,9 @@ def test_good_keyframes(world: World, frames: tuple[list[Keyframe], list[Keyfram
 def test_box_that_slips_in_the_hand(
     world: World, frames: tuple[list[Keyframe], list[Keyframe]]
 ) -> None:
-    contacts, (carried, moved) = frames
+    at_switch, (carried, moved) = frames
     slipped = carried.boxes | {"red": compose(carried.boxes["red"], pose((0.004, 0, 0)))}
-    found = verify_keyframes(world, GRASP_AND_PLACE, contacts, [Keyframe(HOME, slipped), moved])
+    found = verify_keyframes(world, GRASP_AND_PLACE, at_switch, [Keyframe(HOME, slipped), moved])
     assert found is not None
     assert (found.constraint, found.action) == ("rigid red", 0)
 
@@ -233,15 +233,15 @@ def test_box_that_slips_in_the_hand(
 def test_keyframes_verified_before_are_only_where_the_others_start(
     world: World, frames: tuple[list[Keyframe], list[Keyframe]]
 ) -> None:
-    contacts, (carried, moved) = frames
-    nowhere = Keyframe(HOME + 10, contacts[0].boxes)
-    assert verify_keyframes(world, GRASP_AND_PLACE, contacts, [carried, moved], 1) is None
-    assert verify_keyframes(world, GRASP_AND_PLACE, [nowhere, contacts[1]], [carried, moved]) != (
-        verify_keyframes(world, GRASP_AND_PLACE, [nowhere, contacts[1]], [carried, moved], 1)
+    at_switch, (carried, moved) = frames
+    nowhere = Keyframe(HOME + 10, at_switch[0].boxes)
+    assert verify_keyframes(world, GRASP_AND_PLACE, at_switch, [carried, moved], 1) is None
+    assert verify_keyframes(world, GRASP_AND_PLACE, [nowhere, at_switch[1]], [carried, moved]) != (
+        verify_keyframes(world, GRASP_AND_PLACE, [nowhere, at_switch[1]], [carried, moved], 1)
     )
     slipped = carried.boxes | {"red": compose(carried.boxes["red"], pose((0.004, 0, 0)))}
     before = [Keyframe(HOME, slipped), moved]
-    found = verify_keyframes(world, GRASP_AND_PLACE, contacts, before, 1)
+    found = verify_keyframes(world, GRASP_AND_PLACE, at_switch, before, 1)
     assert found is not None
     assert (found.constraint, found.action) == ("rigid red", 1)
 
@@ -249,9 +249,9 @@ def test_keyframes_verified_before_are_only_where_the_others_start(
 def test_box_that_moves_by_itself(
     world: World, frames: tuple[list[Keyframe], list[Keyframe]]
 ) -> None:
-    contacts, (carried, moved) = frames
+    at_switch, (carried, moved) = frames
     crept = moved.boxes | {"green": shifted(moved.boxes["green"], y=0.01)}
-    found = verify_keyframes(world, GRASP_AND_PLACE, contacts, [carried, Keyframe(HOME, crept)])
+    found = verify_keyframes(world, GRASP_AND_PLACE, at_switch, [carried, Keyframe(HOME, crept)])
     assert found is not None
     assert (found.constraint, found.action) == ("rigid green", 1)
 

@@ -163,7 +163,7 @@ def write_plan(
         "fixed_joints": {"torso_lift_joint": scene.robot.torso},
         "keyframes": [
             {"q": rows[switch].tolist(), "boxes": _boxes(keyframe)}
-            for switch, keyframe in zip(switches, result.contacts, strict=True)
+            for switch, keyframe in zip(switches, result.at_switch, strict=True)
         ],
         "path": {
             "times": np.round(trajectory.times, _DECIMALS).tolist(),

@@ -57,12 +57,12 @@ class CoarseResult:
 
     skeleton: Skeleton
     feasible: bool
-    contacts: tuple[Keyframe, ...] = ()
+    at_switch: tuple[Keyframe, ...] = ()
     """At each switch: the acting gripper is at the box (grasp) or still holds it (place)."""
-    retreated: tuple[Keyframe, ...] = ()
+    after_action: tuple[Keyframe, ...] = ()
     """After each action, when the acting arm has retreated: the configuration x_k of the policy."""
     failure: Failure | None = None
-    tries: int = 1
+    restarts: int = 1
     """Starts of the solver that it took."""
     time_s: float = field(default=0.0, compare=False)
 
@@ -97,7 +97,7 @@ class PathResult:
     skeleton: Skeleton
     feasible: bool
     trajectory: Trajectory | None = None
-    contacts: tuple[Keyframe, ...] = ()
+    at_switch: tuple[Keyframe, ...] = ()
     failure: Failure | None = None
     verification: Mapping[str, object] = field(default_factory=dict)
     """Figures of the check in PyBullet: number of configurations, deepest penetration (m)."""

@@ -29,7 +29,7 @@ class SceneBounds:
         if result is None:
             prefix = self.coarse(skeleton[:-1]) if len(skeleton) > 1 else None
             if prefix is not None and not prefix.feasible:
-                result = CoarseResult(skeleton, feasible=False, failure=prefix.failure, tries=0)
+                result = CoarseResult(skeleton, feasible=False, failure=prefix.failure, restarts=0)
             else:
                 result = self._coarse_bound.solve(skeleton, prefix)
             self._coarse[skeleton] = result

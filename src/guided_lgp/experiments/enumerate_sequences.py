@@ -169,7 +169,7 @@ def shortest_table(scene: Scene, found: Enumeration) -> pa.Table:
 
 
 def _states(scene: Scene, verdict: CoarseResult) -> list[float]:
-    keyframes = (start(scene), *verdict.retreated)
+    keyframes = (start(scene), *verdict.after_action)
     positions = [list(observe(scene, keyframe).values()) for keyframe in keyframes]
     flat: list[float] = np.array(positions).ravel().tolist()
     return flat

@@ -71,7 +71,7 @@ class GuidedTree:
         if not node.skeleton:
             return start(self._scene)
         coarse = self.run.coarse(node.skeleton)
-        return coarse.retreated[-1] if coarse.feasible else None
+        return coarse.after_action[-1] if coarse.feasible else None
 
     def expand(self, node: Node, configuration: Keyframe) -> list[Node]:
         """Generate the children of a node, in the fixed order of the logic.

@@ -42,15 +42,15 @@ class CoarseSolution(CoarseResult):
 class CoarseBound:
     """P_coarse for the skeletons of one scene; every feasible verdict has been verified.
 
-    A verdict depends only on the scene, the skeleton and ``tries``: it is defined by recursion
+    A verdict depends only on the scene, the skeleton and ``restarts``: it is defined by recursion
     over the prefixes, whose constraints are a subset. A skeleton with an infeasible prefix is
     infeasible; otherwise the first start continues the solution of the prefix.
     """
 
-    def __init__(self, scene: Scene, tries: int, solver: Solver | None = None) -> None:
-        """Prepare a scene; ``tries`` is the number of starts before giving up."""
+    def __init__(self, scene: Scene, restarts: int, solver: Solver | None = None) -> None:
+        """Prepare a scene; ``restarts`` is the number of starts before giving up."""
         self.scene = scene
-        self._tries = tries
+        self._restarts = restarts
         self._solver = solver or default_solver()
         self._geometry = SceneGeometry(scene)
         self._starts = Starts(self._geometry, self._solver)
@@ -79,7 +79,7 @@ class CoarseBound:
         ):
             prefix = self.solve(skeleton[:-1])
         if prefix is not None and not prefix.feasible:
-            return CoarseResult(skeleton, feasible=False, failure=prefix.failure, tries=0)
+            return CoarseResult(skeleton, feasible=False, failure=prefix.failure, restarts=0)
         result = self._search(skeleton, prefix if isinstance(prefix, CoarseSolution) else None)
         elapsed = time.perf_counter() - started
         return CoarseSolution(**(vars(result) | {"time_s": elapsed}))
@@ -88,7 +88,7 @@ class CoarseBound:
         """Up to ``count`` further verified solutions from independent starts."""
         programs = _Programs(self._geometry, skeleton)
         found = 0
-        for attempt in range(self._tries, self._tries + 3 * count):
+        for attempt in range(self._restarts, self._restarts + 3 * count):
             try:
                 result = self._attempt(programs, attempt, None)
             except UngraspableError:
@@ -103,22 +103,22 @@ class CoarseBound:
         """Start after start until one leads to a verified solution."""
         programs = _Programs(self._geometry, skeleton)
         failures: list[Failure] = []
-        for attempt in range(self._tries):
+        for attempt in range(self._restarts):
             try:
                 result = self._attempt(programs, attempt, prefix)
             except UngraspableError as error:
                 failure = Failure(
                     error.action, f"width of {error.box}", error.width - GRASPABLE, "both sides"
                 )
-                return CoarseSolution(skeleton, feasible=False, failure=failure, tries=0)
+                return CoarseSolution(skeleton, feasible=False, failure=failure, restarts=0)
             if result.feasible:
                 return result
             assert result.failure is not None
             failures.append(result.failure)
         # the prefix is feasible: what fails late in the skeleton tells more
         failure = min(failures, key=lambda failure: (-failure.action, failure.violation))
-        failure = replace(failure, tried=f"{self._tries} starts of the coarse bound")
-        return CoarseSolution(skeleton, feasible=False, failure=failure, tries=self._tries)
+        failure = replace(failure, tried=f"{self._restarts} starts of the coarse bound")
+        return CoarseSolution(skeleton, feasible=False, failure=failure, restarts=self._restarts)
 
     def _attempt(
         self, programs: "_Programs", attempt: int, prefix: CoarseSolution | None
@@ -142,25 +142,25 @@ class CoarseBound:
         skeleton: Skeleton,
         formulation: Formulation,
         solution: Solution,
-        tries: int,
+        restarts: int,
         verified: int,
     ) -> CoarseSolution:
         """Decode a solution and verify it, from the first action on that is not verified yet."""
         if not solution.converged(self._settings):
             failure = _worst(formulation, solution, self._settings.slack)
-            return CoarseSolution(skeleton, feasible=False, failure=failure, tries=tries)
-        contacts = self._keyframes(formulation, formulation.contacts, solution.values)
-        retreated = self._keyframes(formulation, formulation.retreated, solution.values)
-        found = verify_keyframes(self._world, skeleton, contacts, retreated, verified)
+            return CoarseSolution(skeleton, feasible=False, failure=failure, restarts=restarts)
+        at_switch = self._keyframes(formulation, formulation.at_switch, solution.values)
+        after_action = self._keyframes(formulation, formulation.after_action, solution.values)
+        found = verify_keyframes(self._world, skeleton, at_switch, after_action, verified)
         if found is not None:
             failure = Failure(found.action, found.constraint, found.amount, "verification")
-            return CoarseSolution(skeleton, feasible=False, failure=failure, tries=tries)
+            return CoarseSolution(skeleton, feasible=False, failure=failure, restarts=restarts)
         return CoarseSolution(
             skeleton,
             feasible=True,
-            contacts=contacts,
-            retreated=retreated,
-            tries=tries,
+            at_switch=at_switch,
+            after_action=after_action,
+            restarts=restarts,
             values=solution.values[: formulation.program.variables],
         )
 

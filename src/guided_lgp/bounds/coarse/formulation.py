@@ -176,8 +176,8 @@ class Formulation:
     modes: tuple[Mode, ...]
     steps: tuple[tuple[Mode | Placement | Separation | Posture, ...], ...]
     """What each action adds, for the start."""
-    contacts: tuple[Snapshot, ...]
-    retreated: tuple[Snapshot, ...]
+    at_switch: tuple[Snapshot, ...]
+    after_action: tuple[Snapshot, ...]
 
     def level(self, values: Array, where: Level) -> tuple[float, float, float, float]:
         """x, y, yaw and z of a level body."""
@@ -288,15 +288,15 @@ class Formulator:
         Raises:
             UngraspableError: no side of a box to grasp is narrow enough.
         """
-        contacts, retreated = [], []
+        at_switch, after_action = [], []
         for index, action in enumerate(skeleton):
             self._action = index
             self._steps.append([])
-            contacts.append(self._grasp(action) if action.table is None else self._place(action))
+            at_switch.append(self._grasp(action) if action.table is None else self._place(action))
             self._state = successor(self._state, action)
             self._retreat()
-            retreated.append(self._snapshot())
-        return self._finish(tuple(contacts), tuple(retreated))
+            after_action.append(self._snapshot())
+        return self._finish(tuple(at_switch), tuple(after_action))
 
     # actions
 
@@ -599,7 +599,7 @@ class Formulator:
         self._rows.append(Row(self._action, self._kernel[-1], names))
 
     def _finish(
-        self, contacts: tuple[Snapshot, ...], retreated: tuple[Snapshot, ...]
+        self, at_switch: tuple[Snapshot, ...], after_action: tuple[Snapshot, ...]
     ) -> Formulation:
         count = len(self._lower)
         sizes = np.array([[k.inputs, k.parameters, k.rows] for k in kernels()])
@@ -628,8 +628,8 @@ class Formulator:
             rows=tuple(self._rows),
             modes=tuple(self._modes),
             steps=tuple(map(tuple, self._steps)),
-            contacts=contacts,
-            retreated=retreated,
+            at_switch=at_switch,
+            after_action=after_action,
         )
 
 

@@ -68,7 +68,7 @@ class PathBound:
                 self._mover,
                 self._grips,
                 skeleton,
-                solution.contacts,
+                solution.at_switch,
                 trouble,
                 number,
             )
@@ -90,7 +90,7 @@ class PathBound:
                 skeleton,
                 feasible=True,
                 trajectory=trajectory,
-                contacts=tuple(outcome.contact for outcome in outcomes),
+                at_switch=tuple(outcome.contact for outcome in outcomes),
                 verification={
                     "configurations": report.configurations,
                     "deepest_penetration_m": report.deepest_penetration,

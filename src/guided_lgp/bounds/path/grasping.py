@@ -90,7 +90,7 @@ class Grasping:
 
     def _coarse_grip(self, index: int) -> Grips:
         """The coarse solution's own grip."""
-        action, contact = self._task.skeleton[index], self._task.contacts[index]
+        action, contact = self._task.skeleton[index], self._task.at_switch[index]
         box = contact.boxes[action.box]
         arm = self._task.arms[action.gripper]
         rotation, position = arm.forward(contact.q[arm_slice(action.gripper)])
@@ -187,8 +187,8 @@ class Grasping:
         action = self._task.skeleton[later]
         assert action.table is not None
         expected = self._expected(index, later, situation)
-        support = self._task.top(action.table, self._task.contacts[later])
-        reference = placement_of(support, self._task.contacts[later].boxes[box])
+        support = self._task.top(action.table, self._task.at_switch[later])
+        reference = placement_of(support, self._task.at_switch[later].boxes[box])
         targets, ways = self._placing.variant(later, expected, support, reference, variant)
         tools = [grips.tools(target[:3], rotation_matrix(target[3:])) for target in targets]
         rotation = np.concatenate([tool[0] for tool in tools])
@@ -213,7 +213,7 @@ class Grasping:
         moved = {step.box for step in self._task.skeleton[index + 1 : later]}
         moved |= {rider for box in moved for s in self._task.states for rider in s.carried_by(box)}
         poses = situation.boxes(self._task.arms)
-        contact = self._task.contacts[later]
+        contact = self._task.at_switch[later]
         away = {action.box, *self._task.states[later].carried_by(action.box)}
         standing = {
             box: contact.boxes[box] if box in moved else poses[box]
@@ -238,13 +238,13 @@ class Grasping:
         arm = self._task.arms[gripper]
         count = len(grips)
         grasp = inverse(matrix_pose(grips.rotation[grip], grips.offset[grip]))
-        box_pose = self._task.contacts[later].boxes[box]
+        box_pose = self._task.at_switch[later].boxes[box]
         riders = {
             rider: (
                 gripper,
                 compose(
                     grasp,
-                    compose(inverse(box_pose), self._task.contacts[later].boxes[rider]),
+                    compose(inverse(box_pose), self._task.at_switch[later].boxes[rider]),
                 ),
             )
             for rider in self._task.states[later].carried_by(box)

@@ -69,7 +69,7 @@ class Options:
         if loaded:
             yield (), situation
         arm = self._task.arms[holder]
-        target = _upright(self._task.contacts[index].boxes[root])
+        target = _upright(self._task.at_switch[index].boxes[root])
         tool = compose(target, inverse(situation.carried[root][1]))
         rotation = rotation_matrix(tool[3:])[None]
         now = situation.q[arm_slice(holder)]

@@ -49,8 +49,8 @@ class Placing:
         assert action.table is not None
         now = Keyframe(situation.q, situation.boxes(self._task.arms))
         reference = placement_of(
-            self._task.top(action.table, self._task.contacts[index]),
-            self._task.contacts[index].boxes[action.box],
+            self._task.top(action.table, self._task.at_switch[index]),
+            self._task.at_switch[index].boxes[action.box],
         )
         support = self._task.top(action.table, now)
         for variant in VARIANTS:
@@ -184,8 +184,8 @@ class Placing:
         for j in range(index + 1, len(self._task.skeleton)):
             other = self._task.skeleton[j]
             if other.table == table and other.box != box:
-                top = self._task.top(table, self._task.contacts[j])
-                placement = placement_of(top, self._task.contacts[j].boxes[other.box])
+                top = self._task.top(table, self._task.at_switch[j])
+                placement = placement_of(top, self._task.at_switch[j].boxes[other.box])
                 others.append((placement, self._task.half(other.box)))
         half = (
             np.array(self._task.tables[table].half_extents) if on_table else self._task.half(table)
@@ -210,7 +210,7 @@ class Placing:
             if j > index and self._task.skeleton[j].box == box:
                 break
             bodies = (box, *self._task.states[j + 1].carried_by(box))
-            poses = self._task.contacts[j].boxes
+            poses = self._task.at_switch[j].boxes
             weights = np.array([np.prod(self._task.boxes[body].size) for body in bodies])
             relative = compose(inverse(poses[box]), np.array([poses[body] for body in bodies]))
             centres.append(weights @ relative[:, :2] / weights.sum())

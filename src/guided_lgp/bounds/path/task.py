@@ -92,14 +92,14 @@ class Task:
         mover: Mover,
         grips: Mapping[str, tuple[Grips, Grips]],
         skeleton: Skeleton,
-        contacts: Sequence[Keyframe],
+        at_switch: Sequence[Keyframe],
         trouble: Trouble,
         seed: int,
     ) -> None:
         self.mover = mover
         self.arms = mover.arms
         self.skeleton = skeleton
-        self.contacts = contacts
+        self.at_switch = at_switch
         self.trouble = trouble
         self.rng = np.random.default_rng(np.random.SeedSequence([7, seed]))
         self.boxes = {box.name: box for box in scene.boxes}
@@ -126,7 +126,7 @@ class Task:
 
     def reach(self, index: int, arm: Arm, rotation: Array, contact: Array, off: Array) -> Reach:
         """Solve the inverse kinematics of N tool poses at the contact and off it."""
-        q = self.contacts[index].q[arm_slice(arm.gripper)]
+        q = self.at_switch[index].q[arm_slice(arm.gripper)]
         pans = np.append(_PANS * arm.sign[0], q[0])
         positions = np.stack([contact, off], axis=1)[:, :, None]
         q, valid = arm.inverse(

@@ -72,8 +72,8 @@ def verify_keyframe(
 def verify_keyframes(
     world: World,
     skeleton: Skeleton,
-    contacts: Sequence[Keyframe],
-    retreated: Sequence[Keyframe],
+    at_switch: Sequence[Keyframe],
+    after_action: Sequence[Keyframe],
     verified: int = 0,
 ) -> Violation | None:
     """Check the keyframes of a skeleton, in the order in which they are reached.
@@ -84,8 +84,8 @@ def verify_keyframes(
     Args:
         world: of the scene.
         skeleton: the actions.
-        contacts: one keyframe per action, at its switch.
-        retreated: one keyframe per action, after it.
+        at_switch: one keyframe per action, at its switch.
+        after_action: one keyframe per action, after it.
         verified: how many actions, the first ones, were checked before with these keyframes.
 
     Returns:
@@ -95,12 +95,12 @@ def verify_keyframes(
     start = Keyframe(pr2.HOME_CONFIGURATION, initial_poses(world.scene))
     for action in skeleton[:verified]:
         state = successor(state, action)
-    before = retreated[verified - 1] if verified else start
+    before = after_action[verified - 1] if verified else start
     world.set(before.q, before.boxes)
     last = _Modes(world, before)
     for index, action in enumerate(skeleton[verified:], verified):
         after = successor(state, action)
-        moves = ((contacts[index], state, action), (retreated[index], after, None))
+        moves = ((at_switch[index], state, action), (after_action[index], after, None))
         for keyframe, modes, contact in moves:
             found = verify_keyframe(world, keyframe, modes, contact)
             reached = _Modes(world, keyframe)
