@@ -5,8 +5,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from guided_lgp.bounds.results import Array, Attachment, Keyframe, Trajectory
+from guided_lgp.poses import compose, inverse, pose
 from guided_lgp.scene import Box, Scene, Table, pr2
-from guided_lgp.scene.poses import compose, inverse, pose
 from guided_lgp.scene.reach import grasp_poses, solve_arm
 from guided_lgp.scene.world import World, initial_poses
 

@@ -8,8 +8,8 @@ from guided_lgp.bounds.coarse.solver import Interpreter
 from guided_lgp.bounds.results import CoarseResult
 from guided_lgp.bounds.verify import verify_keyframes
 from guided_lgp.logic import Skeleton, applicable_actions, parse_skeleton, progress, successor
+from guided_lgp.poses import tilt
 from guided_lgp.scene import Box, Robot, Scene, Table, generate, pr2
-from guided_lgp.scene.poses import tilt
 from guided_lgp.scene.setups import SETUPS
 from guided_lgp.scene.world import World
 

@@ -9,8 +9,8 @@ from motions import CLOSED, Motion, from_above, grasp, place, reach, scene, shif
 from guided_lgp.bounds.execution import execute
 from guided_lgp.bounds.results import Trajectory
 from guided_lgp.logic import parse_objective, parse_skeleton
+from guided_lgp.poses import compose, pose
 from guided_lgp.scene import Scene, pr2
-from guided_lgp.scene.poses import compose, pose
 from guided_lgp.scene.reach import grasp_poses
 
 STACK = parse_skeleton("(grasp pr2L red) (place pr2L red green)")

@@ -10,7 +10,7 @@ from guided_lgp.bounds.path import PathBound
 from guided_lgp.bounds.results import CoarseResult, Keyframe, PathResult
 from guided_lgp.bounds.verify import verify_path
 from guided_lgp.logic import Goal, Skeleton, parse_skeleton, progress
-from guided_lgp.scene.poses import pose, tilt
+from guided_lgp.poses import pose, tilt
 from guided_lgp.scene.pr2 import HOME_CONFIGURATION, tool_poses
 from guided_lgp.scene.world import World
 

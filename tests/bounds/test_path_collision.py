@@ -3,8 +3,8 @@ import pytest
 from motions import scene
 
 from guided_lgp.bounds.path.collision import CollisionChecker, Mode
+from guided_lgp.poses import compose, inverse, pose
 from guided_lgp.scene import GRIPPERS
-from guided_lgp.scene.poses import compose, inverse, pose
 from guided_lgp.scene.pr2 import (
     FINGER_LIMITS,
     HOME_CONFIGURATION,

@@ -9,8 +9,8 @@ from guided_lgp.bounds.path.motions import Free, Motion, Mover, Still
 from guided_lgp.bounds.path.optimise import LEVEL, optimise
 from guided_lgp.bounds.path.situation import Fingers
 from guided_lgp.bounds.results import Array
+from guided_lgp.poses import pose
 from guided_lgp.scene import GRIPPERS
-from guided_lgp.scene.poses import pose
 from guided_lgp.scene.pr2 import FINGER_LIMITS, HOME, HOME_CONFIGURATION, VELOCITY_LIMITS
 from guided_lgp.scene.world import initial_poses
 

@@ -23,8 +23,8 @@ from guided_lgp.bounds.results import Array, Keyframe, Trajectory
 from guided_lgp.bounds.verify import verify_keyframe, verify_keyframes, verify_path
 from guided_lgp.bounds.verify.path import STEP, resample
 from guided_lgp.logic import Action, State, parse_skeleton
+from guided_lgp.poses import apply, compose, inverse, multiply, pose
 from guided_lgp.scene import Scene, pr2
-from guided_lgp.scene.poses import apply, compose, inverse, multiply, pose
 from guided_lgp.scene.reach import grasp_poses
 from guided_lgp.scene.world import World
 

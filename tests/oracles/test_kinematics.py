@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from guided_lgp.bounds.coarse.kinematics import SPHERES, arm_pose, inverse
+from guided_lgp.poses import apply, rotation_matrix
+from guided_lgp.poses import inverse as inverse_pose
 from guided_lgp.scene import GRIPPERS, Box, Robot, Scene, Table, pr2
-from guided_lgp.scene.poses import apply, rotation_matrix
-from guided_lgp.scene.poses import inverse as inverse_pose
 
 TORSO = 0.21
 SCENE = Scene(

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from guided_lgp.errors import InputError
+from guided_lgp.poses import Array, apply, compose, inverse, pose, tilt, yaw_of
 from guided_lgp.scene import GRIPPERS, Scene, Table, generate, pr2
-from guided_lgp.scene.poses import Array, apply, compose, inverse, pose, tilt, yaw_of
 from guided_lgp.scene.reach import grasp_poses, solve_arm
 from guided_lgp.scene.world import World
 

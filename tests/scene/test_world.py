@@ -6,9 +6,9 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from guided_lgp.poses import pose
 from guided_lgp.scene import GRIPPERS, generate, pr2
 from guided_lgp.scene.bullet import pybullet
-from guided_lgp.scene.poses import pose
 from guided_lgp.scene.world import MARGIN, Camera, World, initial_poses
 
 

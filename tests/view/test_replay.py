@@ -9,8 +9,8 @@ import outputs
 import pytest
 
 from guided_lgp.errors import InputError
+from guided_lgp.poses import compose, inverse, pose
 from guided_lgp.scene import Scene, generate
-from guided_lgp.scene.poses import compose, inverse, pose
 from guided_lgp.scene.pr2 import ARM_JOINTS, tool_pose
 from guided_lgp.scene.world import COLOURS
 from guided_lgp.view.live import view

@@ -15,9 +15,9 @@ from guided_lgp.bounds.results import Array, Trajectory
 from guided_lgp.bounds.verify.geometry import Violation, box_sizes, grasp_faults
 from guided_lgp.bounds.verify.path import switches_of
 from guided_lgp.logic import Goal, Objective, Skeleton
+from guided_lgp.poses import compose, inverse
 from guided_lgp.scene import Scene, pr2
 from guided_lgp.scene.bullet import pybullet
-from guided_lgp.scene.poses import compose, inverse
 from guided_lgp.scene.world import World, initial_poses
 
 RATE = 120

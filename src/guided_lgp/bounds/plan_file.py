@@ -19,8 +19,8 @@ from guided_lgp.bounds.verify.path import switches_of
 from guided_lgp.documents import read_json, write_text
 from guided_lgp.errors import InputError
 from guided_lgp.logic import Action, Goal, Objective, Skeleton
+from guided_lgp.poses import yaw_of
 from guided_lgp.scene import Scene
-from guided_lgp.scene.poses import yaw_of
 
 _DECIMALS = 6
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from guided_lgp.poses import Array
 from guided_lgp.scene.model import Box, Table
-from guided_lgp.scene.poses import Array
 
 _CORNERS = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
 

@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 
 from guided_lgp.errors import InputError
+from guided_lgp.poses import Array, compose, pose
 from guided_lgp.scene.model import GRIPPERS, Scene
-from guided_lgp.scene.poses import Array, compose, pose
 
 _JOINTS = (
     "shoulder_pan_joint",

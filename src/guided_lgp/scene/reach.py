@@ -5,9 +5,9 @@ from itertools import product
 
 import numpy as np
 
+from guided_lgp.poses import Array, compose, inverse
 from guided_lgp.scene import pr2
 from guided_lgp.scene.model import GRIPPERS, Box, Scene
-from guided_lgp.scene.poses import Array, compose, inverse
 
 PITCHES = (np.pi / 2, np.pi / 3, np.pi / 4, np.pi / 6, 0.0)
 """Angles (rad) at which the gripper points down when it grasps: from above to from the side."""

@@ -10,10 +10,10 @@ from weakref import finalize
 import numpy as np
 from numpy.typing import NDArray
 
+from guided_lgp.poses import Array, pose
 from guided_lgp.scene import pr2
 from guided_lgp.scene.bullet import pybullet
 from guided_lgp.scene.model import GRIPPERS, Scene, Table
-from guided_lgp.scene.poses import Array, pose
 
 TABLE_THICKNESS = 0.04
 """Tables and trays are slabs (m) under their top; what holds them up is left out."""

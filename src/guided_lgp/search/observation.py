@@ -3,8 +3,8 @@
 import numpy as np
 
 from guided_lgp.bounds.results import Array, Keyframe
+from guided_lgp.poses import pose
 from guided_lgp.scene import Scene
-from guided_lgp.scene.poses import pose
 from guided_lgp.scene.pr2 import HOME_CONFIGURATION, tool_pose
 
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from guided_lgp.bounds.results import Trajectory
 from guided_lgp.documents import write_text
+from guided_lgp.poses import Array, compose, inverse, pose
 from guided_lgp.scene.model import Scene
-from guided_lgp.scene.poses import Array, compose, inverse, pose
 from guided_lgp.view.viewer import Viewer
 
 FRAME_RATE = 15.0

@@ -11,8 +11,8 @@ import numpy as np
 import pinocchio
 import viser
 
+from guided_lgp.poses import Array, compose, pose
 from guided_lgp.scene.model import Scene
-from guided_lgp.scene.poses import Array, compose, pose
 from guided_lgp.scene.pr2 import (
     ARM_JOINTS,
     HOME_CONFIGURATION,

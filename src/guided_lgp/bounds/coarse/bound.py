@@ -27,8 +27,8 @@ from guided_lgp.bounds.coarse.starts import Starts
 from guided_lgp.bounds.results import Array, CoarseResult, Failure, Keyframe
 from guided_lgp.bounds.verify import verify_keyframes
 from guided_lgp.logic import Skeleton, format_skeleton
+from guided_lgp.poses import compose, multiply, pose
 from guided_lgp.scene import GRIPPERS, Scene, pr2
-from guided_lgp.scene.poses import compose, multiply, pose
 from guided_lgp.scene.world import World
 
 

@@ -18,8 +18,8 @@ from guided_lgp.bounds.coarse.kinematics import COARSE_SPHERES, SPHERES
 from guided_lgp.bounds.coarse.solver import Integers, Program
 from guided_lgp.bounds.results import Array
 from guided_lgp.logic import Action, Skeleton, State, successor
+from guided_lgp.poses import inverse, yaw_of
 from guided_lgp.scene import GRIPPERS, Scene, pr2
-from guided_lgp.scene.poses import inverse, yaw_of
 from guided_lgp.scene.world import TABLE_THICKNESS
 
 GRASPABLE = 0.085

@@ -15,8 +15,8 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from guided_lgp.bounds.results import Array
+from guided_lgp.poses import IDENTITY, pose
 from guided_lgp.scene import GRIPPERS, Scene
-from guided_lgp.scene.poses import IDENTITY, pose
 from guided_lgp.scene.pr2 import (
     ARM_JOINTS,
     ARM_LINKS,

@@ -25,7 +25,7 @@ from guided_lgp.bounds.path.task import (
     retreats,
 )
 from guided_lgp.bounds.results import Array
-from guided_lgp.scene.poses import compose, inverse, rotation_matrix
+from guided_lgp.poses import compose, inverse, rotation_matrix
 from guided_lgp.scene.pr2 import FINGER_LIMITS, HOME, arm_slice, finger_joint
 
 _FORESEEN = 10

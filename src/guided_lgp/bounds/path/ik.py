@@ -12,8 +12,8 @@ Rotations are matrices here, since their columns are what the formulas need.
 import numpy as np
 
 from guided_lgp.bounds.results import Array
+from guided_lgp.poses import rotation_matrix
 from guided_lgp.scene import GRIPPERS, Scene
-from guided_lgp.scene.poses import rotation_matrix
 from guided_lgp.scene.pr2 import HOME, JOINT_LIMITS, MIRROR, base_pose
 
 UPPER_ARM, FOREARM, PAN_OFFSET, TOOL = 0.4, 0.321, 0.1, 0.18

@@ -11,8 +11,8 @@ from guided_lgp.bounds.path.placing import Placing
 from guided_lgp.bounds.path.situation import Situation, Step
 from guided_lgp.bounds.path.task import ELBOWS, Outcome, Task
 from guided_lgp.bounds.results import Array
+from guided_lgp.poses import compose, inverse, pose, rotation_matrix, yaw_of
 from guided_lgp.scene import GRIPPERS
-from guided_lgp.scene.poses import compose, inverse, pose, rotation_matrix, yaw_of
 from guided_lgp.scene.pr2 import HOME, arm_slice
 
 _OUTCOMES = 4

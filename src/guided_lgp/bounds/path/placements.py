@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from guided_lgp.bounds.results import Array
+from guided_lgp.poses import compose, inverse, pose, yaw_of
 from guided_lgp.scene.footprints import gap
-from guided_lgp.scene.poses import compose, inverse, pose, yaw_of
 
 MARGIN = 0.02
 """Distance (m) of a centre of mass from the edge of what it stands on."""

@@ -23,7 +23,7 @@ from guided_lgp.bounds.path.task import (
     retreats,
 )
 from guided_lgp.bounds.results import Array, Keyframe
-from guided_lgp.scene.poses import compose, inverse, rotation_matrix
+from guided_lgp.poses import compose, inverse, rotation_matrix
 from guided_lgp.scene.pr2 import FINGER_LIMITS, HOME, arm_slice
 
 _SIDEWAYS = [0.05 * UP + 0.07 * side for side in np.vstack([np.eye(3)[:2], -np.eye(3)[:2]])]

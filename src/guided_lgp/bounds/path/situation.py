@@ -11,7 +11,7 @@ from guided_lgp.bounds.path.ik import Arm
 from guided_lgp.bounds.path.motions import Motion, Still
 from guided_lgp.bounds.results import Array, Keyframe
 from guided_lgp.logic import State
-from guided_lgp.scene.poses import compose, inverse
+from guided_lgp.poses import compose, inverse
 from guided_lgp.scene.pr2 import arm_slice
 
 

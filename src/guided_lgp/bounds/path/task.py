@@ -11,8 +11,8 @@ from guided_lgp.bounds.path.motions import Free, Motion, Mover, Still
 from guided_lgp.bounds.path.situation import Situation, Step
 from guided_lgp.bounds.results import Array, Keyframe
 from guided_lgp.logic import Skeleton, successor
+from guided_lgp.poses import compose, pose
 from guided_lgp.scene import GRIPPERS, Scene
-from guided_lgp.scene.poses import compose, pose
 from guided_lgp.scene.pr2 import FINGER_LIMITS, HOME, arm_slice
 from guided_lgp.scene.world import initial_poses
 

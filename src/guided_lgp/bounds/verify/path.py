@@ -18,8 +18,8 @@ from guided_lgp.bounds.verify.geometry import (
 )
 from guided_lgp.bounds.verify.keyframes import LIMIT_TOLERANCE
 from guided_lgp.logic import Action, Skeleton, State, applicable_actions, successor
+from guided_lgp.poses import apply, compose, inverse, tilt
 from guided_lgp.scene import GRIPPERS, Scene, pr2
-from guided_lgp.scene.poses import apply, compose, inverse, tilt
 from guided_lgp.scene.world import MARGIN, Penetration, World, initial_poses
 
 STEP = 0.01
