@@ -1,6 +1,7 @@
 """Arms of the installed package ``example-robot-data``, for tests of what is derived from them."""
 
 import os
+import tempfile
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import files
@@ -12,13 +13,23 @@ import pinocchio as pin
 from guided_lgp.robots.chain import Array, Chain, path_between, read_chain, read_joints
 
 
-@cache
 def description(file: str) -> Path:
     """A file of the package, by the end of its path."""
     for found in files("example-robot-data") or []:
         if found.as_posix().endswith("/robots/" + file):
             return Path(os.fspath(found.locate())).resolve()
     raise FileNotFoundError(file)
+
+
+@cache
+def plain(file: str) -> Path:
+    """A copy of a URDF in which the paths of meshes are plain."""
+    source = description(file)
+    share = next(p for p in source.parents if p.name == "example-robot-data").parent
+    text = source.read_text(encoding="utf-8").replace("package://", f"{share}/")
+    copy = Path(tempfile.mkdtemp()) / source.name
+    copy.write_text(text, encoding="utf-8")
+    return copy
 
 
 @dataclass(frozen=True)
@@ -32,7 +43,7 @@ class ArmDescription:
 
     @property
     def urdf(self) -> Path:
-        return description(self.file)
+        return plain(self.file)
 
     @property
     def joints(self) -> list[str]:

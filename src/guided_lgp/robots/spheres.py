@@ -1,0 +1,64 @@
+"""A few spheres that contain a link, for the coarse bound's distances."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from guided_lgp.robots.chain import Array
+from guided_lgp.robots.hulls import between
+
+_MOST = 3
+"""Spheres of one link."""
+_SMALLEST = 0.1
+"""Share of the radius that another sphere has to save."""
+_ITERATIONS = 300
+
+
+@dataclass(frozen=True)
+class Spheres:
+    """Spheres in the frame of a link."""
+
+    centres: Array
+    """(k, 3) m."""
+    radii: Array
+    """(k,) m."""
+
+
+def covering_spheres(vertices: Array, most: int = _MOST) -> Spheres:
+    """Spheres whose union contains the convex hull of points (n, 3) in m.
+
+    The hull is cut into slices of equal thickness along its longest axis, and every slice gets the
+    sphere around it. Of up to ``most`` slices, as many are made as shrink the spheres.
+    """
+    candidates = [_sliced(vertices, count) for count in range(1, most + 1)]
+    best = candidates[0]
+    for candidate in candidates[1:]:
+        if candidate.radii.max() < (1 - _SMALLEST) * best.radii.max():
+            best = candidate
+    return best
+
+
+def _sliced(vertices: Array, count: int) -> Spheres:
+    axis = _longest_axis(vertices)
+    heights = vertices @ axis
+    cuts = np.linspace(heights.min(), heights.max(), count + 1)
+    slices = [between(vertices, axis, low, high) for low, high in pairwise(cuts)]
+    balls = [_ball(points) for points in slices]
+    return Spheres(np.array([centre for centre, _ in balls]), np.array([r for _, r in balls]))
+
+
+def _longest_axis(vertices: Array) -> Array:
+    """The principal axis (3,) along which the points lie farthest apart."""
+    axes = np.linalg.svd(vertices - vertices.mean(axis=0), full_matrices=False)[2]
+    extent = np.ptp(vertices @ axes.T, axis=0)
+    return np.asarray(axes[np.argmax(extent)])
+
+
+def _ball(points: Array) -> tuple[Array, float]:
+    """Centre and radius of a small ball around points (Bădoiu and Clarkson, 2003)."""
+    centre = (points.min(axis=0) + points.max(axis=0)) / 2
+    for i in range(1, _ITERATIONS):
+        farthest = points[np.argmax(((points - centre) ** 2).sum(axis=1))]
+        centre = centre + (farthest - centre) / (i + 1)
+    return centre, float(np.linalg.norm(points - centre, axis=1).max())
