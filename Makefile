@@ -8,7 +8,7 @@ INSTALLED := $(VENV)/.installed
 export PATH := $(BIN):$(PATH)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: setup repro study test lint bench mlflow verify-determinism verify-interruption verify-load
+.PHONY: setup ship repro study test lint bench mlflow verify-determinism verify-interruption verify-load
 
 setup: $(INSTALLED)
 
@@ -20,6 +20,10 @@ $(INSTALLED): requirements.lock pyproject.toml | $(VENV)/bin/pip
 	$(BIN)/pip install -qq -r requirements.lock
 	$(BIN)/pip install -qq --no-deps -e .
 	touch $@
+
+# The weights and limits that `plan` uses: those of the pipeline, taken into the package on purpose.
+ship: setup
+	python -m guided_lgp.ship
 
 # DVC wants a Git repository; an unpacked archive of the sources has none.
 repro: setup

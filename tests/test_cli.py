@@ -289,7 +289,7 @@ def test_doctor_says_how_to_mend(capsys: pytest.CaptureFixture[str]) -> None:
         cli.main(["doctor", "--json"])
     findings = {finding["name"]: finding for finding in json.loads(capsys.readouterr().out)}
     assert findings["Python"]["ok"]
-    assert findings["Robot"]["ok"]
+    assert findings["Robots"]["ok"]
     assert findings["Cache"]["ok"]
     assert findings["Policy paper"]["ok"]
     assert all(finding["ok"] or finding["mend"] for finding in findings.values())

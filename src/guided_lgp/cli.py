@@ -7,6 +7,7 @@ program itself. Heavy packages are imported by the commands that use them.
 import json
 import logging
 import os
+import shutil
 import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -20,9 +21,10 @@ from typing import Annotated, NoReturn
 import typer
 from typer.exceptions import TyperException
 
+from guided_lgp import __version__
 from guided_lgp.documents import read_json
 from guided_lgp.errors import InputError, WorkerError
-from guided_lgp.paths import MODELS, PARAMS, SOURCES
+from guided_lgp.paths import EXAMPLES, MODELS, PARAMS, PLANNING
 
 app = typer.Typer(
     name="guided-lgp",
@@ -188,7 +190,7 @@ def plan(
         typer.Option(
             metavar="FOLDER",
             help="Folder with the trained policies.",
-            show_default="models of the installed clone",
+            show_default="those shipped with the package",
         ),
     ] = MODELS,
     params: Annotated[
@@ -197,9 +199,9 @@ def plan(
             metavar="FILE",
             help="YAML file with the limits of the solver and of the search: the sections bounds "
             "and compare_scalability.",
-            show_default="params.yaml of the installed clone",
+            show_default="those shipped with the package",
         ),
-    ] = SOURCES / PARAMS,
+    ] = PLANNING,
     as_json: AsJson = False,
 ) -> None:
     """Plan a sequence of actions and the motion for it.
@@ -211,7 +213,7 @@ def plan(
     Example: guided-lgp plan scene.json --goal "(on red tray)" --html plan.html --execute
     """
     from guided_lgp.logic import parse_objective
-    from guided_lgp.params import load_params
+    from guided_lgp.params import load_planning
     from guided_lgp.planning import plan as search
     from guided_lgp.scene import load_scene
 
@@ -227,7 +229,7 @@ def plan(
             planner.value,
             policy=policy.value,
             models=models,
-            params=load_params(params),
+            params=load_planning(params),
             max_nodes=max_nodes,
             where=str(scene),
         )
@@ -235,6 +237,8 @@ def plan(
     statistics = {
         "planner": planner.value,
         "policy": None if planner is Planner.BREADTH_FIRST else policy.value,
+        "weights": None if planner is Planner.BREADTH_FIRST else _origin(models, MODELS),
+        "limits": _origin(params, PLANNING),
         "tree_size": result.tree_size,
         "attempts": 1 + sum(result.reattempts.values()),
         "coarse_sequences": result.coarse_calls,
@@ -280,11 +284,32 @@ def plan(
         return
     _show(["", "action"], [(str(k), str(a)) for k, a in enumerate(path.skeleton, 1)])
     typer.echo(f"motion of {path.trajectory.times[-1]:.1f} s, found in {sum(times.values()):.1f} s")
+    guide = (
+        f"policy {policy.value}, weights {statistics['weights']}; " if statistics["policy"] else ""
+    )
+    typer.echo(f"with: {guide}limits {statistics['limits']}")
     if physics is not None:
         fault = physics["fault"] or f"goals: {physics['goals']}"
         typer.echo(f"physics: {'all goals hold' if physics['success'] else fault}")
     for file in filter(None, (out, html)):
         typer.echo(f"written: {file}")
+
+
+@app.command()
+def examples(
+    folder: Annotated[
+        Path, typer.Argument(metavar="FOLDER", help="Where to put them; it is made if need be.")
+    ] = Path("examples"),
+) -> None:
+    """Copy the example scenes that come with the package.
+
+    Example: guided-lgp examples
+    """
+    if folder.exists() and any(folder.iterdir()):
+        raise InputError(str(folder), "is not empty", "a new folder")
+    shutil.copytree(EXAMPLES, folder, dirs_exist_ok=True)
+    for scene in sorted(folder.glob("*.json")):
+        typer.echo(scene)
 
 
 @app.command()
@@ -459,6 +484,11 @@ def _run_stage(stage: str, params_file: Path, *arguments: str) -> None:
         module.run(params, Path.cwd(), *arguments)
 
 
+def _origin(path: Path, shipped: Path) -> str:
+    """Where weights or limits come from, for the user: the package, unless another was named."""
+    return f"shipped with {__version__}" if path == shipped else str(path)
+
+
 def _show(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     """Print rows: a table on a terminal, lines with tabs in a pipe."""
     if not sys.stdout.isatty():
@@ -524,6 +554,8 @@ def run_program(program: Callable[[list[str]], int | None], arguments: Sequence[
         code = program([word for word in arguments if word != "--debug"])
     except (InputError, TyperException) as error:
         _fail(error, 2, debug)
+    except ModuleNotFoundError as error:
+        _fail(_missing(error), 2, debug)
     except KeyboardInterrupt:
         sys.exit(130)
     except Exception as error:
@@ -541,6 +573,17 @@ def end_with_dvc() -> None:
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     if "DVC_STAGE" in os.environ:
         parallel.end_with_parent(os.getppid(), signal.SIGTERM)
+
+
+def _missing(error: ModuleNotFoundError) -> Exception:
+    """What to install for a package that the core goes without; a module of our own is a fault."""
+    package = (error.name or "").partition(".")[0]
+    if package in ("", "guided_lgp"):
+        return error
+    extra = {"viser": "view", "dask": "cluster", "distributed": "cluster"}.get(package, "pipeline")
+    return InputError(
+        f"package {package}", "is not installed", f"pip install 'guided-lgp[{extra}]'"
+    )
 
 
 def _fail(error: Exception, code: int, debug: bool) -> NoReturn:

@@ -12,7 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryFile
 
 from guided_lgp.errors import InputError
-from guided_lgp.paths import MODELS, SOURCES
+from guided_lgp.paths import DESCRIPTIONS, MODELS, SOURCES
 
 _INSTALL = f"pip install -r {SOURCES / 'requirements.lock'}"
 _POLICIES = {
@@ -42,13 +42,8 @@ def examine() -> list[Finding]:
 
 
 def _python() -> Finding:
-    ok = sys.version_info[:2] == (3, 11)
-    return Finding(
-        "Python",
-        ok,
-        platform.python_version(),
-        "" if ok else "PyBullet has wheels up to Python 3.11: make a virtual environment with it",
-    )
+    hint = "" if sys.version_info < (3, 12) else "PyBullet was built here; 3.11 has a wheel of it"
+    return Finding("Python", sys.version_info >= (3, 11), platform.python_version(), hint)
 
 
 def _packages() -> Finding:
@@ -70,13 +65,9 @@ def _packages() -> Finding:
 
 
 def _robot() -> Finding:
-    try:
-        files = metadata.files("example-robot-data") or []
-    except metadata.PackageNotFoundError:
-        files = []
-    ok = any(file.name == "pr2.urdf" for file in files)
-    detail = "PR2 description found" if ok else "PR2 description missing"
-    return Finding("Robot", ok, detail, "" if ok else "pip install example-robot-data")
+    found = sorted(folder.name for folder in DESCRIPTIONS.glob("*_description"))
+    mend = "" if found else "pip install --force-reinstall --no-deps guided-lgp"
+    return Finding("Robots", bool(found), " ".join(found) or "no description", mend)
 
 
 def _compiler() -> Finding:
@@ -114,7 +105,10 @@ def _policy(name: str) -> Finding:
         return Finding(title, False, str(error), _INSTALL)
     except InputError as error:
         return Finding(
-            title, False, str(error), f"git checkout models, or: dvc repro {_POLICIES[name]}"
+            title,
+            False,
+            str(error),
+            f"git checkout src, or: dvc repro {_POLICIES[name]}; make ship",
         )
     return Finding(title, True, f"trained, in {MODELS}")
 

@@ -9,6 +9,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 from pydantic_core import PydanticCustomError
 
 from guided_lgp.errors import InputError
+from guided_lgp.paths import PARAMS, PLANNING
 
 
 def _no_truth_value(value: object) -> object:
@@ -150,11 +151,17 @@ class SearchLimits(Section):
     take a day."""
 
 
-class Params(Section):
+class PlanningParams(Section):
+    """What planning one task needs; the parameters of the stages may stand in the same file."""
+
+    bounds: BoundsParams
+    compare_scalability: SearchLimits
+
+
+class Params(PlanningParams):
     """All parameters; top keys are stage names."""
 
     parallel: Parallel
-    bounds: BoundsParams
     generate_scenes: GenerateScenes
     enumerate_sequences: EnumerateSequences
     build_dataset: BuildDataset
@@ -162,12 +169,22 @@ class Params(Section):
     train_improved: TrainPolicy
     train_relational: TrainRelational
     evaluate_generalization: SearchLimits
-    compare_scalability: SearchLimits
 
 
-def load_params(path: Path = Path("params.yaml")) -> Params:
+def load_params(path: Path = PARAMS) -> Params:
     """Read and check the parameters of the pipeline; see :func:`read_params`."""
     return read_params(path, Params)
+
+
+def load_planning(path: Path = PLANNING) -> PlanningParams:
+    """Read and check the parameters of planning: the shipped ones, or those of a pipeline.
+
+    Raises:
+        InputError: see :func:`read_params`.
+    """
+    document = _read(path)
+    whole = isinstance(document, dict) and not document.keys() <= PlanningParams.model_fields.keys()
+    return _validated(path, document, Params if whole else PlanningParams)
 
 
 def read_params(path: Path, model: type[Parameters]) -> Parameters:
@@ -181,8 +198,12 @@ def read_params(path: Path, model: type[Parameters]) -> Parameters:
         InputError: the file is missing, is not YAML, has an unknown key, a wrong type or an
             impossible value; the message names the key and what is accepted.
     """
+    return _validated(path, _read(path), model)
+
+
+def _read(path: Path) -> Any:
     try:
-        document = yaml.safe_load(path.read_text(encoding="utf-8"))
+        return yaml.safe_load(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise InputError(str(path), error.strerror or "cannot be read") from None
     except RecursionError:
@@ -190,6 +211,9 @@ def read_params(path: Path, model: type[Parameters]) -> Parameters:
     except (yaml.YAMLError, ValueError, LookupError, AttributeError) as error:
         # PyYAML raises the last three for values that do not fit their tag, such as 2024-13-45.
         raise InputError(str(path), f"is not YAML: {' '.join(str(error).split())}") from None
+
+
+def _validated(path: Path, document: Any, model: type[Parameters]) -> Parameters:
     try:
         return model.model_validate(document)
     except ValidationError as error:

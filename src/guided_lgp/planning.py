@@ -9,8 +9,8 @@ from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.errors import InputError
 from guided_lgp.explanation import ObservedBounds, Obstacle
 from guided_lgp.logic import Goal, parse_objective, validate_objective
-from guided_lgp.params import Params, load_params
-from guided_lgp.paths import MODELS, PARAMS, SOURCES
+from guided_lgp.params import PlanningParams, load_planning
+from guided_lgp.paths import MODELS
 from guided_lgp.policy.inference import load_policy
 from guided_lgp.scene import Scene
 from guided_lgp.scene.validate import validate_scene
@@ -62,7 +62,7 @@ def plan(
     *,
     policy: str = "relational",
     models: Path = MODELS,
-    params: Params | None = None,
+    params: PlanningParams | None = None,
     max_nodes: int | None = None,
     where: str = "scene",
 ) -> PlanningResult:
@@ -73,9 +73,9 @@ def plan(
         objective: goals, parsed or as text: ``["(on red green)", "(held blue)"]``.
         planner: ``guided``, ``best-first`` or ``breadth-first``.
         policy: ``paper``, ``improved`` or ``relational``; breadth-first needs none.
-        models: folder with the trained weights.
+        models: folder with the trained weights; by default, those shipped with the package.
         params: limits of the bounds and of the search (sections ``bounds`` and
-            ``compare_scalability``); the ones of the clone by default.
+            ``compare_scalability``); the shipped ones by default.
         max_nodes: nodes of the search tree at which the search ends, instead of the limit in
             ``params``.
         where: the scene's file, for messages.
@@ -92,7 +92,7 @@ def plan(
     goals = parse_objective([objective] if isinstance(objective, str) else map(str, objective))
     validate_scene(scene, where)
     validate_objective(goals, scene.symbols, scene.state)
-    params = params or load_params(SOURCES / PARAMS)
+    params = params or load_planning()
     limits = params.compare_scalability
     if max_nodes is not None:
         limits = limits.model_copy(update={"max_tree_size": max_nodes})

@@ -1,6 +1,6 @@
 """The PR2: description files, joints, limits and kinematics.
 
-The description is the one of the package ``example-robot-data`` (BSD-3). The URDF's root is
+The description is a copy of the one in ``example-robot-data`` (BSD-3). The URDF's root is
 ``base_footprint``, on the floor, 51 mm below ``base_link``; a scene's ``robot.base`` (x, y, yaw)
 places that root in the world.
 """
@@ -12,13 +12,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
-from importlib.metadata import PackageNotFoundError, files
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from guided_lgp.errors import InputError
+from guided_lgp.paths import DESCRIPTIONS
 from guided_lgp.poses import Array, compose, pose
 from guided_lgp.scene.model import GRIPPERS, Scene
 
@@ -161,21 +161,9 @@ def arm_slice(gripper: str) -> slice:
     return slice(start, start + 7)
 
 
-@cache
 def description_folder() -> Path:
-    """The folder ``pr2_description`` of the installed package ``example-robot-data``.
-
-    Raises:
-        InputError: the package is not installed, or lacks the PR2.
-    """
-    try:
-        recorded = files("example-robot-data") or []
-    except PackageNotFoundError:
-        raise InputError("example-robot-data", "is not installed", "pip install .") from None
-    for file in recorded:
-        if file.parts[-3:] == ("pr2_description", "urdf", "pr2.urdf"):
-            return Path(os.fspath(file.locate())).resolve().parents[1]
-    raise InputError("example-robot-data", "has no pr2_description/urdf/pr2.urdf")
+    """The folder of the PR2's URDF, SRDF and meshes."""
+    return DESCRIPTIONS / "pr2_description"
 
 
 @cache
@@ -190,8 +178,7 @@ def urdf_path() -> Path:
     """
     folder = description_folder()
     source = (folder / "urdf" / "pr2.urdf").read_text(encoding="utf-8")
-    package = folder.parents[1]
-    root = ET.fromstring(source.replace("package://example-robot-data", str(package)))
+    root = ET.fromstring(source.replace("package://example-robot-data/robots", str(folder.parent)))
     for link in root.iter("link"):
         if link.find("inertial") is None and link.get("name") != "base_footprint":
             inertial = ET.SubElement(link, "inertial")

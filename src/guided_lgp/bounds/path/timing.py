@@ -1,15 +1,34 @@
 """From geometric paths to a trajectory: time-optimal within velocity and acceleration limits."""
 
 import logging
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import ModuleType
 
 import numpy as np
-import toppra
-import toppra.algorithm
-import toppra.constraint
 
 from guided_lgp.bounds.path.ik import REACH
 from guided_lgp.bounds.results import Array
 from guided_lgp.scene.pr2 import ACCELERATION_LIMITS, VELOCITY_LIMITS, arm_slice
+
+
+@contextmanager
+def _without_plots() -> Iterator[None]:
+    """Stand in for matplotlib while toppra is imported: it would load it, for plots, in 0.4 s."""
+    absent = {"matplotlib", "matplotlib.pyplot"} - sys.modules.keys()
+    sys.modules.update({name: ModuleType(name) for name in absent})
+    try:
+        yield
+    finally:
+        for name in absent:
+            del sys.modules[name]
+
+
+with _without_plots():
+    import toppra
+    import toppra.algorithm
+    import toppra.constraint
 
 INTERVAL = 0.05
 """Longest time (s) between two rows of a trajectory."""

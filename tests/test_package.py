@@ -1,0 +1,150 @@
+"""The wheel, in an environment with nothing but what it declares: planning from an empty folder."""
+
+import json
+import shutil
+import subprocess
+import sys
+import venv
+from collections.abc import Sequence
+from importlib.metadata import Distribution
+from pathlib import Path
+
+import pytest
+import yaml
+from packaging.requirements import Requirement
+
+from guided_lgp.params import PlanningParams, load_params, load_planning
+from guided_lgp.paths import MODELS, PLANNING
+from guided_lgp.ship import ship
+
+ROOT = Path(__file__).parents[1]
+PIPELINE_ONLY = ("torch", "lightning", "mlflow", "dvc", "pandas", "pyarrow", "joblib", "jinja2")
+LIMIT = 1.2 * 2**30
+"""Bytes of the core's packages, of which PyBullet, CasADi and Boost are more than half."""
+
+
+def needed(name: str, *extras: str, path: Sequence[str] = sys.path) -> dict[str, Distribution]:
+    """A distribution and all that it requires, with some of its extras, by name."""
+    found: dict[str, Distribution] = {}
+    waiting = [(name, {"", *extras})]
+    while waiting:
+        name, wanted = waiting.pop()
+        package = next(iter(Distribution.discover(name=name, path=list(path))))
+        found[package.name] = package
+        for requirement in map(Requirement, package.requires or []):
+            marker = requirement.marker
+            chosen = marker is None or any(marker.evaluate({"extra": extra}) for extra in wanted)
+            if chosen and (requirement.name not in found or requirement.extras):
+                waiting.append((requirement.name, {"", *requirement.extras}))
+    return found
+
+
+def top_level(package: Distribution) -> set[Path]:
+    """Files and folders that a distribution puts into site-packages."""
+    names = {file.parts[0] for file in package.files or [] if ".." not in file.parts}
+    return {Path(str(package.locate_file(name))) for name in names if name != "__pycache__"}
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("wheel")
+    sources = folder / "sources"
+    shutil.copytree(
+        ROOT / "src", sources / "src", ignore=shutil.ignore_patterns("__pycache__", "*.egg-info")
+    )
+    for name in ("pyproject.toml", "README.md", "LICENSE"):
+        shutil.copy(ROOT / name, sources)
+    command = [sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", folder, sources]
+    subprocess.run(command, check=True, timeout=300)
+    (built,) = folder.glob("*.whl")
+    return built
+
+
+@pytest.fixture(scope="module")
+def environment(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The wheel and links to what it requires, with the extra for looking; nothing else."""
+    folder = tmp_path_factory.mktemp("environment")
+    venv.create(folder, with_pip=False)
+    (site,) = folder.glob("lib/python*/site-packages")
+    words = ["install", "-q", "--no-deps", "--prefix", str(folder), str(wheel)]
+    subprocess.run(
+        [sys.executable, "-m", "pip", "--python", str(folder / "bin/python"), *words],
+        check=True,
+        timeout=300,
+    )
+    for package in needed("guided-lgp", "view", path=[str(site), *sys.path]).values():
+        for entry in top_level(package):
+            if not (site / entry.name).exists():
+                (site / entry.name).symlink_to(entry)
+    return folder
+
+
+def run(environment: Path, *words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    command = [str(environment / "bin" / words[0]), *words[1:]]
+    return subprocess.run(
+        command, cwd=cwd, text=True, capture_output=True, check=False, timeout=300
+    )
+
+
+def test_the_wheel_plans_views_and_writes_a_page_from_an_empty_folder(
+    environment: Path, tmp_path: Path
+) -> None:
+    for package in PIPELINE_ONLY:
+        absent = run(environment, "python", "-c", f"import {package}", cwd=tmp_path)
+        assert "ModuleNotFoundError" in absent.stderr, package
+    copied = run(environment, "guided-lgp", "examples", cwd=tmp_path)
+    assert "examples/three_boxes.json" in copied.stdout
+    goals = ["--goal", "(on red green)", "--goal", "(held blue)"]
+    files = ["--out", "plan.json", "--html", "plan.html"]
+    words = ["guided-lgp", "plan", "examples/three_boxes.json", *goals, *files, "--execute"]
+    planned = run(environment, *words, cwd=tmp_path)
+    assert planned.returncode == 0, planned.stderr
+    assert "physics: all goals hold" in planned.stdout
+    assert "weights shipped with" in planned.stdout
+    assert json.loads((tmp_path / "plan.json").read_text())["actions"]
+    assert "<script" in (tmp_path / "plan.html").read_text()
+    assert "error" not in run(environment, "guided-lgp", "doctor", cwd=tmp_path).stderr
+
+
+def test_a_stage_without_its_packages_names_the_extra(environment: Path, tmp_path: Path) -> None:
+    shutil.copy(ROOT / "params.yaml", tmp_path)
+    refused = run(environment, "guided-lgp", "build_dataset", cwd=tmp_path)
+    assert refused.returncode == 2
+    assert refused.stderr.count("\n") == 1
+    assert "pip install 'guided-lgp[pipeline]'" in refused.stderr
+
+
+def test_the_core_is_small() -> None:
+    packages = needed("guided-lgp").values()
+    files = {Path(str(file.locate())) for package in packages for file in package.files or []}
+    assert sum(file.stat().st_size for file in files if file.is_file()) < LIMIT
+
+
+def test_planning_imports_neither_training_nor_tables_nor_plots() -> None:
+    code = "import sys, guided_lgp.planning, guided_lgp.cli; print(*sys.modules)"
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], text=True, capture_output=True, check=True
+    )
+    assert {*PIPELINE_ONLY, "matplotlib"}.isdisjoint(loaded.stdout.split())
+
+
+def test_shipped_limits_are_those_of_the_pipeline() -> None:
+    params = load_params(ROOT / "params.yaml")
+    assert load_planning().model_dump() == params.model_dump(
+        include=set(PlanningParams.model_fields)
+    )
+    assert load_planning(ROOT / "params.yaml") == params
+
+
+def test_ship_takes_the_weights_and_limits_of_a_clone(tmp_path: Path) -> None:
+    clone = tmp_path / "clone"
+    shutil.copytree(ROOT / "models", clone / "models")
+    (clone / "models" / "relational.json").write_text("{}")
+    params = yaml.safe_load((ROOT / "params.yaml").read_text())
+    params["bounds"]["coarse_tries"] = 5
+    (clone / "params.yaml").write_text(yaml.safe_dump(params))
+    ship(clone, tmp_path / "models", tmp_path / "planning.yaml")
+    assert (tmp_path / "models" / "relational.json").read_text() == "{}"
+    assert {f.name for f in (tmp_path / "models").iterdir()} == {f.name for f in MODELS.iterdir()}
+    assert load_planning(tmp_path / "planning.yaml").bounds.coarse_tries == 5
+    assert load_planning(PLANNING).bounds.coarse_tries != 5
