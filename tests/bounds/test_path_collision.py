@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from motions import scene
 
-from guided_lgp.bounds.path.collision import CollisionChecker, Mode
+from guided_lgp.bounds.path.collision import CollisionChecker, PlanningScene
 from guided_lgp.poses import compose, inverse, pose
 from guided_lgp.scene import GRIPPERS
 from guided_lgp.scene.pr2 import (
@@ -28,7 +28,7 @@ def checker() -> CollisionChecker:
 
 
 def test_home_is_free(checker: CollisionChecker) -> None:
-    checker.enter(Mode("pr2L", initial_poses(SCENE)))
+    checker.enter(PlanningScene("pr2L", initial_poses(SCENE)))
     assert checker.first_collision(HOME_CONFIGURATION[None], OPEN) is None
 
 
@@ -37,7 +37,7 @@ def test_never_more_optimistic_than_pybullet(checker: CollisionChecker, gripper:
     arm = arm_slice(gripper)
     limits = JOINT_LIMITS[arm]
     rng = np.random.default_rng(2)
-    checker.enter(Mode(gripper, initial_poses(SCENE)))
+    checker.enter(PlanningScene(gripper, initial_poses(SCENE)))
     agreed, free = 0, 0
     with World(SCENE) as world:
         for _ in range(300):
@@ -55,7 +55,7 @@ def test_never_more_optimistic_than_pybullet(checker: CollisionChecker, gripper:
 
 def test_distances_and_their_gradients(checker: CollisionChecker) -> None:
     rng = np.random.default_rng(3)
-    checker.enter(Mode("pr2L", initial_poses(SCENE)))
+    checker.enter(PlanningScene("pr2L", initial_poses(SCENE)))
     low = np.array([0.3, 0.5, 0.9, -1.2, 0.6, -0.9, 0.4])  # above tab1 and its boxes
     for _ in range(10):
         q = HOME_CONFIGURATION.copy()
@@ -76,7 +76,7 @@ def test_carried_box_moves_with_the_hand(checker: CollisionChecker) -> None:
     del standing["red"]
     for grasp, hit in ((held, False), (at_the_other_arm, True)):
         touching = frozenset({frozenset({"pr2L", "red"})})
-        checker.enter(Mode("pr2L", standing, {"red": ("pr2L", grasp)}, touching))
+        checker.enter(PlanningScene("pr2L", standing, {"red": ("pr2L", grasp)}, touching))
         pair = checker.first_collision(HOME_CONFIGURATION[None], OPEN)
         assert (pair is not None and "red" in pair) == hit
 
@@ -87,10 +87,10 @@ def test_boxes_collide_with_boxes_and_tables_unless_declared(checker: CollisionC
     for target, where in (("tab1", (0.5, 0.2, 0.64)), ("green", (0.5, -0.3, 0.7))):
         rest = {name: p for name, p in standing.items() if name != "red"}
         carried = {"red": ("pr2L", compose(inverse(tool), pose(where)))}
-        checker.enter(Mode("pr2L", rest, carried))
+        checker.enter(PlanningScene("pr2L", rest, carried))
         pair = checker.first_collision(HOME_CONFIGURATION[None], OPEN)
         assert pair is not None
         assert {target, "red"} == set(pair)
         declared = frozenset({frozenset({target, "red"})})
-        checker.enter(Mode("pr2L", rest, carried, declared))
+        checker.enter(PlanningScene("pr2L", rest, carried, declared))
         assert checker.first_collision(HOME_CONFIGURATION[None], OPEN) is None

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from motions import scene
 
-from guided_lgp.bounds.path.collision import Mode
-from guided_lgp.bounds.path.motions import Free, Motion, Mover, Still
+from guided_lgp.bounds.path.collision import PlanningScene
+from guided_lgp.bounds.path.motions import Motion, Mover, Surroundings, Tool, Transit
 from guided_lgp.bounds.path.optimise import LEVEL, optimise
 from guided_lgp.bounds.path.situation import Fingers
 from guided_lgp.bounds.results import Array
@@ -25,8 +25,10 @@ def mover() -> Mover:
     return Mover(SCENE, 150)
 
 
-def still(gripper: str = "pr2L", **boxes: Array) -> Still:
-    return Still(Mode(gripper, initial_poses(SCENE) | boxes), HOME_CONFIGURATION, FINGERS)
+def around(gripper: str = "pr2L", **boxes: Array) -> Surroundings:
+    return Surroundings(
+        PlanningScene(gripper, initial_poses(SCENE) | boxes), HOME_CONFIGURATION, FINGERS
+    )
 
 
 def straight(*corners: Array) -> Array:
@@ -42,19 +44,19 @@ def duration(*motions: Motion) -> float:
     return float(sum(motion.timed[0][-1] for motion in motions))
 
 
-def free_motion(path: Array, surroundings: Still, level: bool = False) -> Motion:
-    return Motion(surroundings.mode.gripper, path, Free(surroundings, level))
+def free_motion(path: Array, surroundings: Surroundings, level: bool = False) -> Motion:
+    return Motion(surroundings.scene.gripper, path, Transit(surroundings, level))
 
 
 @pytest.mark.parametrize("gripper", GRIPPERS)
 def test_detour_becomes_short_and_smooth(mover: Mover, gripper: str) -> None:
     mirror = mover.arms[gripper].sign
     detour = straight(HOME[gripper], mirror * ASIDE, mirror * AHEAD)
-    slow = free_motion(detour, still(gripper))
+    slow = free_motion(detour, around(gripper))
     (fast,) = optimise(mover, [slow])
     assert isinstance(fast, Motion)
     assert np.array_equal(fast.path[[0, -1]], detour[[0, -1]])
-    assert mover.collision(still(gripper), fast.path) is None
+    assert mover.collision(around(gripper), fast.path) is None
     assert length(fast.path) < 1.05 * length(detour[[0, -1]])
     assert duration(fast) < 0.8 * duration(slow)
 
@@ -62,28 +64,26 @@ def test_detour_becomes_short_and_smooth(mover: Mover, gripper: str) -> None:
 def test_keeps_clear_of_what_is_in_the_way(mover: Mover) -> None:
     """A box hangs where the hand would pass on the direct way: the detour is only shortened."""
     _, middle = mover.arms["pr2L"].forward((HOME["pr2L"] + AHEAD) / 2)
-    around = still(green=pose(tuple(middle)))
-    assert mover.collision(around, straight(HOME["pr2L"], AHEAD)) is not None
-    found = mover.transit(around, HOME["pr2L"], AHEAD, np.random.default_rng(0))
+    surroundings = around(green=pose(tuple(middle)))
+    assert mover.collision(surroundings, straight(HOME["pr2L"], AHEAD)) is not None
+    found = mover.transit(surroundings, HOME["pr2L"], AHEAD, np.random.default_rng(0))
     assert found is not None
-    slow = [free_motion(path, around) for path in found]
+    slow = [free_motion(path, surroundings) for path in found]
     (fast,) = optimise(mover, slow)
     assert isinstance(fast, Motion)
-    assert mover.collision(around, fast.path) is None
+    assert mover.collision(surroundings, fast.path) is None
     assert duration(fast) < 0.9 * duration(*slow)
 
 
 def test_goes_on_into_a_straight_line_without_a_rest(mover: Mover) -> None:
-    arm, side = mover.arms["pr2L"], mover.side("pr2L", AHEAD)
-    rotation, position = arm.forward(AHEAD)
-    ahead = 0.09 * rotation[:, 0]
-    path = mover.line(still(), (rotation, position), ahead, (AHEAD[0], AHEAD[0]), side)
+    tool = mover.tool("pr2L", AHEAD)
+    path = mover.line(around(), tool, 0.09 * tool.rotation[:, 0])
     assert isinstance(path, np.ndarray), path
     line = Motion("pr2L", path)
-    come = free_motion(straight(HOME["pr2L"], AHEAD), still())
+    come = free_motion(straight(HOME["pr2L"], AHEAD), around())
     (joined,) = optimise(mover, [come, line])
     assert isinstance(joined, Motion)
-    assert joined.free is None
+    assert joined.transit is None
     assert np.array_equal(joined.path[1 - len(path) :], line.path[1:])
     steps = np.diff(joined.path, axis=0)
     directions = steps / np.linalg.norm(steps, axis=1, keepdims=True)
@@ -92,8 +92,8 @@ def test_goes_on_into_a_straight_line_without_a_rest(mover: Mover) -> None:
 
 
 def test_other_steps_stay_where_they_are(mover: Mover) -> None:
-    come = free_motion(straight(HOME["pr2L"], ASIDE), still())
-    go = free_motion(straight(ASIDE, HOME["pr2L"]), still())
+    come = free_motion(straight(HOME["pr2L"], ASIDE), around())
+    go = free_motion(straight(ASIDE, HOME["pr2L"]), around())
     close = Fingers("pr2L", 0.1)
     first, second, third = optimise(mover, [come, close, go])
     assert second is close
@@ -111,10 +111,9 @@ def test_level_motion_stays_level(mover: Mover) -> None:
     side = mover.side("pr2L", AHEAD)
     assert valid[:, side].all()
     legs = [
-        mover.line(still(), (rotation, a), b - a, (AHEAD[0], AHEAD[0]), side)
-        for a, b in pairwise(ways)
+        mover.line(around(), Tool(rotation, a, AHEAD[0], side), b - a) for a, b in pairwise(ways)
     ]
-    slow = [free_motion(np.asarray(leg), still(), level=True) for leg in legs]
+    slow = [free_motion(np.asarray(leg), around(), level=True) for leg in legs]
     (fast,) = optimise(mover, slow)
     assert isinstance(fast, Motion)
     assert duration(fast) < duration(*slow)
@@ -123,10 +122,10 @@ def test_level_motion_stays_level(mover: Mover) -> None:
 
 
 def test_stays_as_it_is_where_nothing_is_gained(mover: Mover) -> None:
-    direct = free_motion(straight(HOME["pr2L"], ASIDE), still())
+    direct = free_motion(straight(HOME["pr2L"], ASIDE), around())
     again = optimise(mover, optimise(mover, [direct]))
     (best,) = again
     assert isinstance(best, Motion)
     assert duration(best) <= duration(direct)
-    inside = free_motion(direct.path, still(red=pose(tuple(mover.arms["pr2L"].forward(ASIDE)[1]))))
+    inside = free_motion(direct.path, around(red=pose(tuple(mover.arms["pr2L"].forward(ASIDE)[1]))))
     assert optimise(mover, [inside]) == [inside]

@@ -8,9 +8,9 @@ from guided_lgp.bounds.path.assembly import assemble
 from guided_lgp.bounds.path.grips import grips_of
 from guided_lgp.bounds.path.motions import Mover
 from guided_lgp.bounds.path.optimise import optimise
-from guided_lgp.bounds.path.options import Options
+from guided_lgp.bounds.path.sampler import OutcomeSampler
 from guided_lgp.bounds.path.situation import Situation
-from guided_lgp.bounds.path.task import Outcome, Task, Trouble
+from guided_lgp.bounds.path.task import FurthestFailure, Outcome, Stage, Task
 from guided_lgp.bounds.results import CoarseResult, Failure, PathResult
 from guided_lgp.bounds.verify import verify_path
 from guided_lgp.scene import Scene
@@ -58,7 +58,7 @@ class PathBound:
         """
         began = time.perf_counter()
         skeleton = coarse_result.skeleton
-        trouble = Trouble()
+        furthest = FurthestFailure()
         others = self._coarse.solutions(skeleton, self._solutions)
         tried = 0
         for number, solution in enumerate(islice(chain([coarse_result], others), self._solutions)):
@@ -69,11 +69,11 @@ class PathBound:
                 self._grips,
                 skeleton,
                 solution.at_switch,
-                trouble,
+                furthest,
                 number,
             )
             limit = self._mover.queries + _QUERIES * (len(skeleton) + 4)
-            outcomes = self._search(Options(task), limit, 0, task.start)
+            outcomes = self._search(task, OutcomeSampler(task), limit, 0, task.start)
             if not isinstance(outcomes, list):
                 continue
             steps = [step for outcome in outcomes for step in outcome.steps]
@@ -84,7 +84,7 @@ class PathBound:
                     break
             if report.violation is not None:
                 fault = report.violation
-                trouble.note(fault.action, 10, fault.constraint)
+                furthest.record(fault.action, Stage.VERIFICATION, fault.constraint)
                 continue
             return PathResult(
                 skeleton,
@@ -98,8 +98,8 @@ class PathBound:
                 time_s=time.perf_counter() - began,
             )
         failure = Failure(
-            max(trouble.action, 0),
-            trouble.constraint,
+            max(furthest.action, 0),
+            furthest.constraint,
             float("nan"),
             f"{tried} coarse solutions with grips, elbows and placements chosen anew",
         )
@@ -111,17 +111,17 @@ class PathBound:
         )
 
     def _search(
-        self, options: Options, limit: int, index: int, situation: Situation
+        self, task: Task, sampler: OutcomeSampler, limit: int, index: int, situation: Situation
     ) -> list[Outcome] | int:
         """Carry out the actions from ``index`` on, or say which earlier one to change."""
-        if index == options.length:
+        if index == len(task):
             return []
-        for outcome in options.of(index, situation):
-            rest = self._search(options, limit, index + 1, outcome.situation)
+        for outcome in sampler.outcomes(index, situation):
+            rest = self._search(task, sampler, limit, index + 1, outcome.situation)
             if isinstance(rest, list):
                 return [outcome, *rest]
             if rest < index:
                 return rest
-            if self._mover.queries > limit or options.visits > _VISITS * (options.length + 4):
+            if self._mover.queries > limit or sampler.visits > _VISITS * (len(task) + 4):
                 return -1
-        return options.culprit(index)
+        return sampler.backjump_target(index)

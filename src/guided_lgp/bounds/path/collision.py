@@ -35,7 +35,7 @@ PADDING = 0.003
 
 
 @dataclass(frozen=True)
-class Mode:
+class PlanningScene:
     """What is where, and what may touch, while one arm moves."""
 
     gripper: str
@@ -49,7 +49,7 @@ class Mode:
 
 
 class CollisionChecker:
-    """Checks configurations of the robot in one scene; the mode says which bodies move."""
+    """Checks configurations of the robot in one scene; a planning scene says which move."""
 
     def __init__(self, scene: Scene) -> None:
         self._model = pin.buildModelFromUrdf(str(urdf_path()))
@@ -112,23 +112,23 @@ class CollisionChecker:
             for gripper in GRIPPERS
         }
 
-    def enter(self, mode: Mode) -> None:
-        """Put the boxes where the mode says, and check what can collide while its arm moves."""
-        moving = list(self._arm[mode.gripper])
-        for box, placement in mode.standing.items():
+    def enter(self, scene: PlanningScene) -> None:
+        """Put the boxes where the scene says, and check what can collide while its arm moves."""
+        moving = list(self._arm[scene.gripper])
+        for box, placement in scene.standing.items():
             self._move(box, 0, pin.XYZQUATToSE3(placement))
-        for box, (gripper, grasp) in mode.carried.items():
+        for box, (gripper, grasp) in scene.carried.items():
             joint, tool = self._tool[gripper]
             self._move(box, joint, tool * pin.XYZQUATToSE3(grasp))
-            if gripper == mode.gripper:
+            if gripper == scene.gripper:
                 moving.append(self._index[box])
         moves = np.zeros(len(self._names), dtype=bool)
         moves[moving] = True
         active = self._candidates & (moves[:, None] | moves[None, :])
-        carried = moving[len(self._arm[mode.gripper]) :]
+        carried = moving[len(self._arm[scene.gripper]) :]
         for body in carried:
             active[body, carried] = False
-        for one, other in mode.touching:
+        for one, other in scene.touching:
             first, second = self._bodies[one], self._bodies[other]
             active[first, second] = active[second, first] = False
         self._geometry_data.setActiveCollisionPairs(self._geometry, active, True)

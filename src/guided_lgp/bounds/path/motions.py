@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from guided_lgp.bounds.path.collision import CollisionChecker, Mode
+from guided_lgp.bounds.path.collision import CollisionChecker, PlanningScene
 from guided_lgp.bounds.path.connect import connect, shortcut
 from guided_lgp.bounds.path.ik import Arm
 from guided_lgp.bounds.path.spaces import (
@@ -32,10 +32,10 @@ _SHORTCUTS = 12
 
 
 @dataclass(frozen=True)
-class Still:
-    """What stands still while one arm moves: the mode, the other arm, the fingers."""
+class Surroundings:
+    """What stands still while one arm moves: the bodies, the other arms, the fingers."""
 
-    mode: Mode
+    scene: PlanningScene
     q: Array
     """Configuration (14,); the moving arm's part does not matter."""
     fingers: Mapping[str, float]
@@ -43,12 +43,26 @@ class Still:
 
 
 @dataclass(frozen=True)
-class Free:
-    """Why a motion could be another: it only has to keep clear of what stands still."""
+class Transit:
+    """What a motion has to do that only leads somewhere: keep clear of its surroundings."""
 
-    still: Still
-    level: bool
+    surroundings: Surroundings
+    keep_level: bool
     """Whether the hand keeps its tilt."""
+
+
+@dataclass(frozen=True)
+class Tool:
+    """Where the tool of an arm is, and how the arm gets it there."""
+
+    rotation: Array
+    """(3, 3)"""
+    position: Array
+    """(3,) of the frame's origin (m)."""
+    pan: float
+    """Angle of the pan joint (rad)."""
+    side: int
+    """Of the elbow."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +72,7 @@ class Motion:
     gripper: str
     path: Array
     """Configurations (n, 7) in rad, for a cubic spline through them."""
-    free: Free | None = None
+    transit: Transit | None = None
     """None for a straight line, which is where it has to be."""
 
     @cached_property
@@ -80,60 +94,60 @@ class Mover:
         """Collision queries so far: the measure of effort."""
         return self._checker.queries
 
-    def collision(self, still: Still, q: Array) -> tuple[str, str] | None:
+    def collision(self, surroundings: Surroundings, q: Array) -> tuple[str, str] | None:
         """The first pair of bodies in collision along configurations (n, 7) of the moving arm."""
-        return self._space(still).collision(q)
+        return self._space(surroundings).collision(q)
 
-    def distances(self, still: Still, q: Array, count: int) -> tuple[Array, Array]:
+    def distances(self, surroundings: Surroundings, q: Array, count: int) -> tuple[Array, Array]:
         """Smallest distances (n, count) in m along configurations (n, 7) of the moving arm, and
         their gradients (n, count, 7).
         """
-        return self._space(still).distances(q, count)
+        return self._space(surroundings).distances(q, count)
 
     def line(
         self,
-        still: Still,
-        tool: tuple[Array, Array],
+        surroundings: Surroundings,
+        tool: Tool,
         direction: Array,
-        pans: tuple[float, float],
-        side: int,
+        shift: float = 0.0,
     ) -> Array | str:
         """A free straight line of the tool, which does not turn.
 
         Args:
-            still: what stands still.
-            tool: rotation (3, 3) and origin (3,) of the tool frame at the start.
+            surroundings: what stands still.
+            tool: at the start.
             direction: displacement (3,) of the tool (m).
-            pans: angle of the pan joint (rad) at the start and at the end.
-            side: of the elbow.
+            shift: turn of the pan joint (rad) on the way.
 
         Returns:
             Configurations (n, 7), or what is wrong with it.
         """
-        arm = self.arms[still.mode.gripper]
+        arm = self.arms[surroundings.scene.gripper]
         count = 2 + int(np.linalg.norm(direction) / LINE_STEP)
-        position = tool[1] + np.linspace(0.0, 1.0, count)[:, None] * direction
-        q, valid = arm.inverse(tool[0], position, np.linspace(*pans, count))
-        path = continuous_path(q[:, side], valid[:, side])
+        position = tool.position + np.linspace(0.0, 1.0, count)[:, None] * direction
+        q, valid = arm.inverse(
+            tool.rotation, position, np.linspace(tool.pan, tool.pan + shift, count)
+        )
+        path = continuous_path(q[:, tool.side], valid[:, tool.side])
         if path is None:
             return "out of reach"
         rotation, middle = arm.forward((path[:-1] + path[1:]) / 2)
         astray = np.abs(middle - (position[:-1] + position[1:]) / 2).max()
-        turned_by = np.abs(rotation - tool[0]).max()
+        turned_by = np.abs(rotation - tool.rotation).max()
         if astray > _ASTRAY or turned_by > 10 * _ASTRAY:
             return "out of reach"
-        blocked = self.collision(still, path)
+        blocked = self.collision(surroundings, path)
         return path if blocked is None else f"collision {' '.join(blocked)}"
 
     def transit(
-        self, still: Still, start: Array, goal: Array, rng: np.random.Generator
+        self, surroundings: Surroundings, start: Array, goal: Array, rng: np.random.Generator
     ) -> list[Array] | None:
         """A free motion in joint space: the direct line, or else RRT-Connect and shortcuts.
 
         Returns:
             Paths (n, 7) with a rest between two of them, or None.
         """
-        space = self._space(still)
+        space = self._space(surroundings)
         points = connect(space, start, goal, rng, self._iterations)
         if points is None:
             return None
@@ -142,13 +156,13 @@ class Mover:
         return _rounded(space, points)
 
     def level_transit(
-        self, still: Still, start: Array, goal: Array, rng: np.random.Generator
+        self, surroundings: Surroundings, start: Array, goal: Array, rng: np.random.Generator
     ) -> list[Array] | None:
         """A free motion on which the hand keeps its tilt: what it holds stays level.
 
         Both ends must have the elbow on the same side, and the hand at the same tilt.
         """
-        arm = self.arms[still.mode.gripper]
+        arm = self.arms[surroundings.scene.gripper]
         rotation, position = arm.forward(np.stack([start, goal]))
         turn = rotation[1] @ rotation[0].T
         yaw = float(np.arctan2(turn[1, 0], turn[0, 0]))
@@ -157,7 +171,7 @@ class Mover:
         side = self.side(arm.gripper, start)
         if self.side(arm.gripper, goal) != side:
             return None
-        space = LevelSpace(self._space(still), arm, rotation[0], side)
+        space = LevelSpace(self._space(surroundings), arm, rotation[0], side)
         ends = np.array([[*position[0], 0.0, start[0]], [*position[1], yaw, goal[0]]])
         points = connect(space, ends[0], ends[1], rng, self._iterations)
         if points is None:
@@ -171,15 +185,24 @@ class Mover:
             paths.append(wound(path, start if not paths else paths[-1][-1]))
         return paths
 
+    def tool(self, gripper: str, q: Array) -> Tool:
+        """Where the tool is for joints (7,)."""
+        return Tool(*self.arms[gripper].forward(q), float(q[0]), self.side(gripper, q))
+
     def side(self, gripper: str, q: Array) -> int:
         """On which side (0 or 1) of the inverse kinematics the elbow is for joints (7,)."""
         arm = self.arms[gripper]
         solutions, _ = arm.inverse(*arm.forward(q), q[0])
         return int(np.argmin(np.abs(np.sin((solutions - q) / 2)).sum(axis=1)))
 
-    def _space(self, still: Still) -> JointSpace:
-        self._checker.enter(still.mode)
-        return JointSpace(self._checker, self.arms[still.mode.gripper], still.q, still.fingers)
+    def _space(self, surroundings: Surroundings) -> JointSpace:
+        self._checker.enter(surroundings.scene)
+        return JointSpace(
+            self._checker,
+            self.arms[surroundings.scene.gripper],
+            surroundings.q,
+            surroundings.fingers,
+        )
 
 
 def _rounded(space: JointSpace, points: list[Array]) -> list[Array]:

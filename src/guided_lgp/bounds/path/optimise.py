@@ -30,7 +30,7 @@ from scipy.interpolate import CubicSpline
 
 from guided_lgp.bounds.coarse.kinematics import arm_pose
 from guided_lgp.bounds.path.ik import REACH, Arm
-from guided_lgp.bounds.path.motions import Free, Motion, Mover
+from guided_lgp.bounds.path.motions import Motion, Mover, Transit
 from guided_lgp.bounds.path.situation import Step
 from guided_lgp.bounds.path.spaces import STEP
 from guided_lgp.bounds.results import Array
@@ -87,14 +87,13 @@ def _joined(mover: Mover, gripper: str, motions: Sequence[Motion]) -> list[Motio
     """The free motions optimised, those that succeed joined with the lines before and after."""
     pieces = [list(piece) for _, piece in groupby(motions, key=_freedom)]
     paths = [np.concatenate([p[0].path, *(m.path[1:] for m in p[1:])]) for p in pieces]
-    lines = {i: paths[i] for i, piece in enumerate(pieces) if piece[0].free is None}
-    optimised = {
-        i: path
-        for i, piece in enumerate(pieces)
-        if piece[0].free is not None
-        and (path := _optimised(mover, piece[0].free, paths[i], lines.get(i - 1), lines.get(i + 1)))
-        is not None
-    }
+    lines = {i: paths[i] for i, piece in enumerate(pieces) if piece[0].transit is None}
+    optimised: dict[int, Array] = {}
+    for i, piece in enumerate(pieces):
+        transit = piece[0].transit
+        if transit is not None:
+            path = _optimised(mover, transit, paths[i], lines.get(i - 1), lines.get(i + 1))
+            optimised |= {} if path is None else {i: path}
     result: list[Motion] = []
     for i, piece in enumerate(pieces):
         new = [Motion(gripper, optimised[i])] if i in optimised else piece
@@ -112,11 +111,11 @@ def _freedom(motion: Motion) -> bool | None:
 
     Free motions that follow each other have the same surroundings, so they are one.
     """
-    return None if motion.free is None else motion.free.level
+    return None if motion.transit is None else motion.transit.keep_level
 
 
 def _optimised(
-    mover: Mover, free: Free, path: Array, before: Array | None, after: Array | None
+    mover: Mover, transit: Transit, path: Array, before: Array | None, after: Array | None
 ) -> Array | None:
     """The best free spline (n, 7) between the ends of a path, or None.
 
@@ -125,7 +124,7 @@ def _optimised(
 
     Args:
         mover: checks it.
-        free: what it must keep clear of.
+        transit: what it must keep clear of, and whether it is level.
         path: (n, 7) from which to start.
         before: the straight line that leads to its first configuration, if there is one.
         after: the one that begins at its last.
@@ -140,25 +139,25 @@ def _optimised(
         None if after is None else _direction(after[0], after[1]),
     )
     points = np.stack([np.interp(spline.knots, s, joint) for joint in path.T], axis=1)
-    arm = mover.arms[free.still.mode.gripper]
-    vertical = arm.forward(path[0])[0][2] if free.level else None
+    arm = mover.arms[transit.surroundings.scene.gripper]
+    vertical = arm.forward(path[0])[0][2] if transit.keep_level else None
     limits = JOINT_LIMITS[arm_slice(arm.gripper)]
     best: Array | None = None
     for number in range(ROUNDS):
-        linearised = free.level or number > 0
-        near = mover.distances(free.still, points[1:-1], NEIGHBOURS) if linearised else None
-        last = points
-        inner = _round(spline, last, near, arm.sign, vertical, limits)
-        if inner is None:
+        linearised = transit.keep_level or number > 0
+        last, inner = points, points[1:-1]
+        near = mover.distances(transit.surroundings, inner, NEIGHBOURS) if linearised else None
+        found = _round(spline, last, near, arm.sign, vertical, limits)
+        if found is None:
             break
-        moved = np.concatenate([last[:1], inner, last[-1:]])
+        moved = np.concatenate([last[:1], found, last[-1:]])
         candidate = spline.sampled(moved)
         clear = (
             np.all(
                 (candidate > limits[:, 0] + _NEAR_LIMIT) & (candidate < limits[:, 1] - _NEAR_LIMIT)
             )
             and (vertical is None or _turned(arm, candidate, vertical) < LEVEL)
-            and mover.collision(free.still, candidate) is None
+            and mover.collision(transit.surroundings, candidate) is None
         )
         if clear:
             best = candidate

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pinocchio as pin
 
-from guided_lgp.bounds.path.collision import Mode
+from guided_lgp.bounds.path.collision import PlanningScene
 from guided_lgp.bounds.path.ik import Arm
-from guided_lgp.bounds.path.motions import Motion, Still
+from guided_lgp.bounds.path.motions import Motion, Surroundings
 from guided_lgp.bounds.results import Array, Keyframe
 from guided_lgp.logic import State
 from guided_lgp.poses import compose, inverse
@@ -64,11 +64,16 @@ class Situation:
             poses[box] = compose(tools[gripper], grasp)
         return poses
 
-    def still(self, gripper: str, touching: Iterable[tuple[str, str]] = ()) -> Still:
+    def loaded(self, gripper: str) -> bool:
+        """Whether a gripper holds a box with others on it, which has to stay level."""
+        held = self.state.held_by(gripper)
+        return held is not None and bool(self.state.carried_by(held))
+
+    def around(self, gripper: str, touching: Iterable[tuple[str, str]] = ()) -> Surroundings:
         """What stands still while the gripper's arm moves."""
-        contacts = frozenset(frozenset(pair) for pair in touching)
-        mode = Mode(gripper, self.standing, self.carried, contacts | self._held_contacts())
-        return Still(mode, self.q, self.fingers)
+        contacts = frozenset(frozenset(pair) for pair in touching) | self._held_contacts()
+        scene = PlanningScene(gripper, self.standing, self.carried, contacts)
+        return Surroundings(scene, self.q, self.fingers)
 
     def after(self, step: Step, arms: Mapping[str, Arm]) -> "Situation":
         """The situation after a step (the symbolic state does not change here)."""

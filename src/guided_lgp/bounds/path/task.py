@@ -1,14 +1,17 @@
 """What all ways to carry out the actions of a skeleton share, and the arm's reach at a contact."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from enum import IntEnum
 
 import numpy as np
 
+from guided_lgp.bounds.path.declared import bind
 from guided_lgp.bounds.path.grips import Grips
 from guided_lgp.bounds.path.ik import REACH, Arm, continuous_near
-from guided_lgp.bounds.path.motions import Free, Motion, Mover, Still
+from guided_lgp.bounds.path.motions import Motion, Mover, Surroundings, Tool, Transit
 from guided_lgp.bounds.path.situation import Situation, Step
+from guided_lgp.bounds.path.steps import manoeuvre
 from guided_lgp.bounds.results import Array, Keyframe
 from guided_lgp.logic import Skeleton, successor
 from guided_lgp.poses import compose, pose
@@ -16,23 +19,34 @@ from guided_lgp.scene import GRIPPERS, Scene
 from guided_lgp.scene.pr2 import FINGER_LIMITS, HOME, arm_slice
 from guided_lgp.scene.world import initial_poses
 
-APPROACH = 0.09
-"""Length (m) of the straight way to a grasp and from a place, along the hand."""
-LIFT = 0.08
-"""Length (m) of the straight way up after a grasp and down to a place."""
-UP = np.array([0.0, 0.0, 1.0])
 _PANS = np.linspace(-0.7, 2.28, 15)
 """Pan angles (rad) of the left arm that are tried for every pose, beside the coarse one."""
-CONFIGURATIONS = 150
-"""Configurations of grip and elbow that are looked at per action and batch of placements."""
-ELBOWS = 3
-"""Elbow postures per grip or placement whose motions are planned."""
 PAN_SHIFTS = (0.0, 0.25, -0.25, 0.5, -0.5)
 """Turns of the pan joint (rad) on the straight way off a box that are tried."""
 
 
 Choice = tuple[int, int, int]
 """Tool pose, pan angle and side of the elbow."""
+
+
+class Stage(IntEnum):
+    """How far an action had come when an obstacle was met."""
+
+    REACH = 0
+    CONTACT = 1
+    OFF = 2
+    """Where the straight way in begins."""
+    LEFT = 3
+    """Where the straight way out ends, as foreseen by an earlier action."""
+    LINE_IN = 4
+    LINE_OUT = 5
+    OUT = 6
+    """Where the straight way out ends."""
+    TRANSIT = 7
+    HOME = 8
+    ASIDE = 9
+    """An arm that nobody needs any more goes home."""
+    VERIFICATION = 10
 
 
 @dataclass(frozen=True)
@@ -45,27 +59,29 @@ class Outcome:
 
 
 @dataclass
-class Trouble:
+class FurthestFailure:
     """The obstacle met farthest on the way through the skeleton."""
 
     action: int = -1
     stage: int = -1
     constraint: str = "no motion found"
 
-    def note(self, action: int, stage: int, constraint: str) -> None:
-        """Remember the obstacle unless one farther on is known."""
+    def record(self, action: int, stage: Stage, constraint: str) -> None:
+        """Remember the obstacle unless one as far on is known."""
         if (action, stage) > (self.action, self.stage):
             self.action, self.stage, self.constraint = action, stage, constraint
 
 
 @dataclass(frozen=True)
 class Reach:
-    """Configurations of an arm for N tool poses at a contact and before (or after) it."""
+    """Configurations of an arm for N tool poses at a contact and off it."""
 
     rotation: Array
     """(N, 3, 3) of the tool frame."""
     contact: Array
     """(N, 3) origin of the tool frame (m)."""
+    way: Array
+    """(N, 3) from the contact to where the tool is off it (m)."""
     q: Array
     """(N, 2, P, 2, 7): at the contact and off it, by pan angle and side of the elbow."""
     pans: Array
@@ -73,9 +89,14 @@ class Reach:
     cost: Array
     """(N, P, 2): distance of the second from the home posture; infinite out of reach."""
 
-    def order(self, extra: Array | None = None) -> list[Choice]:
+    def tool(self, choice: Choice) -> Tool:
+        """The tool at the contact."""
+        number, pan, side = choice
+        return Tool(self.rotation[number], self.contact[number], float(self.pans[pan]), side)
+
+    def order(self, extra: Array | float = 0.0) -> list[Choice]:
         """All configurations within reach, cheapest first; ``extra`` (N,) is added to the cost."""
-        cost = self.cost if extra is None else self.cost + extra[:, None, None]
+        cost = self.cost + np.reshape(extra, (-1, 1, 1))
         flat = np.argsort(cost, axis=None, kind="stable")
         flat = flat[: int(np.isfinite(cost).sum())]
         return [
@@ -92,15 +113,15 @@ class Task:
         mover: Mover,
         grips: Mapping[str, tuple[Grips, Grips]],
         skeleton: Skeleton,
-        at_switch: Sequence[Keyframe],
-        trouble: Trouble,
+        contacts: Sequence[Keyframe],
+        failure: FurthestFailure,
         seed: int,
     ) -> None:
         self.mover = mover
         self.arms = mover.arms
-        self.skeleton = skeleton
-        self.at_switch = at_switch
-        self.trouble = trouble
+        self.manoeuvres = [manoeuvre(bind(action)) for action in skeleton]
+        self.contacts = contacts
+        self.failure = failure
         self.rng = np.random.default_rng(np.random.SeedSequence([7, seed]))
         self.boxes = {box.name: box for box in scene.boxes}
         self.tables = {table.name: table for table in scene.tables}
@@ -116,19 +137,29 @@ class Task:
             {},
         )
 
-    def root(self, index: int) -> tuple[str | None, str | None]:
-        """The lowest body below the place of an action, and who holds it, if anyone."""
-        action, state = self.skeleton[index], self.states[index]
-        root = action.table if action.instruction == "place" else state.support_of(action.box)
-        while root is not None and state.support_of(root) is not None:
-            root = state.support_of(root)
-        return root, None if root is None else state.holder(root)
+    def __len__(self) -> int:
+        return len(self.manoeuvres)
 
-    def reach(self, index: int, arm: Arm, rotation: Array, contact: Array, off: Array) -> Reach:
+    def next_move(self, index: int) -> int | None:
+        """The next action on the body of one."""
+        bodies = [manoeuvre.body for manoeuvre in self.manoeuvres]
+        return next((j for j in range(index + 1, len(self)) if bodies[j] == bodies[index]), None)
+
+    def root(self, index: int, body: str) -> str:
+        """The lowest body below one, or that itself, before an action."""
+        while (support := self.states[index].support_of(body)) is not None:
+            body = support
+        return body
+
+    def carrier(self, index: int, body: str) -> str | None:
+        """The gripper that holds a body, or what the body stands on, before an action."""
+        return self.states[index].holder(self.root(index, body))
+
+    def reach(self, index: int, arm: Arm, rotation: Array, contact: Array, way: Array) -> Reach:
         """Solve the inverse kinematics of N tool poses at the contact and off it."""
-        q = self.at_switch[index].q[arm_slice(arm.gripper)]
+        q = self.contacts[index].q[arm_slice(arm.gripper)]
         pans = np.append(_PANS * arm.sign[0], q[0])
-        positions = np.stack([contact, off], axis=1)[:, :, None]
+        positions = np.stack([contact, contact + way], axis=1)[:, :, None]
         q, valid = arm.inverse(
             rotation[:, None, None],
             positions,
@@ -136,7 +167,7 @@ class Task:
         )
         distance = np.linalg.norm((q[:, 1] - arm.home) * REACH, axis=-1)
         cost = np.where(valid.all(axis=1), distance, np.inf)
-        return Reach(rotation, contact, q, pans, cost)
+        return Reach(rotation, contact, way, q, pans, cost)
 
     def level_reach(self, reach: Reach, gripper: str, situation: Situation) -> Reach:
         """What a level motion can reach: the elbow's side stays; the nearest first."""
@@ -147,53 +178,21 @@ class Task:
         cost[..., 1 - side] = np.inf
         return replace(reach, cost=cost)
 
-    def ways(
-        self,
-        index: int,
-        reach: Reach,
-        order: Sequence[Choice],
-        stills: tuple[tuple[Still, str], tuple[Still, str]],
-        planned: Callable[[Choice], Outcome | None],
-        possible: Callable[[int], bool] = lambda pose: True,
-    ) -> Iterator[Outcome]:
-        """Carry out an action with the nearest configurations that are free of collisions.
-
-        Args:
-            index: of the action.
-            reach: configurations for every pose of the tool.
-            order: of the configurations; the first :data:`CONFIGURATIONS` are looked at.
-            stills: what stands still at the contact and off it, and the name of a collision there.
-            planned: plans all motions from one of the configurations.
-            possible: whether a pose of the tool is worth planning; asked before any motion is.
-        """
-        attempts = np.zeros(len(reach.cost), dtype=int)
-        for choice in order[:CONFIGURATIONS]:
-            pose, pan, side = choice
-            if attempts[pose] >= ELBOWS:
-                continue
-            if self._collides(index, reach.q[pose, :, pan, side], stills) or not possible(pose):
-                continue
-            attempts[pose] += 1
-            outcome = planned(choice)
-            if outcome is not None:
-                attempts[pose] = ELBOWS
-                yield outcome
-
-    def _collides(self, index: int, q: Array, stills: Sequence[tuple[Still, str]]) -> bool:
-        """Whether joints (2, 7) at the contact or off it collide, and note it."""
-        for stage, (joints, (still, name)) in enumerate(zip(q, stills, strict=True), 1):
-            blocked = self.mover.collision(still, joints[None])
-            if blocked is not None:
-                self.note(index, stage, f"{name} collision", blocked)
-                return True
-        return False
-
-    def transit(self, still: Still, start: Array, goal: Array, level: bool) -> list[Motion] | None:
+    def transit(
+        self, surroundings: Surroundings, start: Array, goal: Array, keep_level: bool
+    ) -> list[Motion] | None:
         """A free motion to joints ``goal`` (7,), with rests at some corners, or None."""
-        plan = self.mover.level_transit if level else self.mover.transit
-        paths = plan(still, start, goal, self.rng)
-        free = Free(still, level)
-        return None if paths is None else [Motion(still.mode.gripper, p, free) for p in paths]
+        plan = self.mover.level_transit if keep_level else self.mover.transit
+        paths = plan(surroundings, start, goal, self.rng)
+        gripper, transit = surroundings.scene.gripper, Transit(surroundings, keep_level)
+        return None if paths is None else [Motion(gripper, path, transit) for path in paths]
+
+    def home(self, situation: Situation, gripper: str) -> list[Motion] | None:
+        """A free motion of an arm to its side; none where it carries a stack, or is there."""
+        now = situation.q[arm_slice(gripper)]
+        if situation.loaded(gripper) or np.array_equal(now, HOME[gripper]):
+            return []
+        return self.transit(situation.around(gripper), now, HOME[gripper], keep_level=False)
 
     def after(self, situation: Situation, steps: Sequence[Step]) -> Situation:
         """The situation after steps."""
@@ -201,21 +200,27 @@ class Task:
             situation = situation.after(step, self.arms)
         return situation
 
-    def top(self, table: str, keyframe: Keyframe) -> Array:
+    def top(self, table: str, boxes: Mapping[str, Array]) -> Array:
         """Pose (7,) of the top of a table or box."""
         if table in self.tables:
             return pose(self.tables[table].position, self.tables[table].yaw)
-        return compose(keyframe.boxes[table], pose((0, 0, self.boxes[table].size[2] / 2)))
+        return compose(boxes[table], pose((0, 0, self.boxes[table].size[2] / 2)))
 
-    def half(self, box: str) -> Array:
-        """Half extents (2,) of a box's top (m)."""
-        return np.array(self.boxes[box].size[:2]) / 2
+    def half(self, body: str) -> Array:
+        """Half extents (2,) of the top of a table or box (m)."""
+        if body in self.tables:
+            return np.array(self.tables[body].half_extents)
+        return np.array(self.boxes[body].size[:2]) / 2
 
-    def note(self, action: int, stage: int, what: str, pair: tuple[str, str]) -> None:
-        """Remember two bodies in collision as the obstacle of an action."""
-        self.trouble.note(action, stage, f"{what} {' '.join(pair)}")
+    def record(self, index: int, stage: Stage, constraint: str) -> None:
+        """Remember an obstacle of an action."""
+        self.failure.record(index, stage, constraint)
 
-
-def retreats(approach: Array) -> list[Array]:
-    """Directions (m) in which the open hand leaves a box: back, back and up, up."""
-    return [-APPROACH * approach, APPROACH * (0.5 * UP - approach), 0.11 * UP]
+    def blocked(
+        self, index: int, stage: Stage, where: str, surroundings: Surroundings, q: Array
+    ) -> bool:
+        """Whether configurations (n, 7) of the moving arm collide, and remember it."""
+        pair = self.mover.collision(surroundings, q)
+        if pair is not None:
+            self.record(index, stage, f"collision {' '.join(pair)} {where}")
+        return pair is not None

@@ -1,0 +1,168 @@
+"""What a grip must allow: the next action on the body that it holds."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+
+from guided_lgp.bounds.path.grips import Grips
+from guided_lgp.bounds.path.placing import STRATEGIES, Place, PlacementSampler, PlaceStrategy
+from guided_lgp.bounds.path.situation import Fingers, Situation, matrix_pose
+from guided_lgp.bounds.path.steps import Way
+from guided_lgp.bounds.path.task import PAN_SHIFTS, Reach, Stage, Task
+from guided_lgp.bounds.results import Array
+from guided_lgp.poses import compose, inverse, rotation_matrix
+from guided_lgp.scene.pr2 import FINGER_LIMITS
+
+_FORESEEN = 10
+"""Configurations at the later contact that are looked at per grip."""
+
+
+@dataclass(frozen=True)
+class Outlook:
+    """What each of M grips means for the next action on the body."""
+
+    cost: Array
+    """(M,): cheapest configuration at the later contact; infinite out of reach."""
+    possible: Callable[[int], bool]
+    """Whether a grip allows the action without collisions."""
+
+
+class Foresight:
+    """Looks from the grasp of a body to the next action on it, near the coarse solution."""
+
+    def __init__(self, task: Task, placements: PlacementSampler) -> None:
+        self._task = task
+        self._placements = placements
+
+    def outlook(
+        self, index: int, situation: Situation, grips: Grips, strategy: PlaceStrategy
+    ) -> Outlook | None:
+        """How grips of the body suit its next action, which follows a strategy.
+
+        None where the strategy adds nothing: nobody moves the body again, or hands take it.
+        """
+        later = self._task.next_move(index)
+        if later is None:
+            first = strategy == STRATEGIES[0]
+            return Outlook(np.zeros(len(grips)), lambda grip: True) if first else None
+        expected = self._expected(index, later, situation)
+        targets = self._targets(later, expected, strategy)
+        if not targets:
+            return None
+        holder = self._task.manoeuvres[index].parent
+        reach = self._reach(later, holder, targets, grips)
+        cost = reach.cost.reshape(len(targets), len(grips), -1).min(axis=(0, 2))
+        if not np.isfinite(cost).any():
+            self._task.record(later, Stage.REACH, "no inverse kinematics")
+        return Outlook(
+            cost,
+            cache(
+                lambda grip: self._possible(later, holder, expected, targets, reach, grips, grip)
+            ),
+        )
+
+    def _targets(self, later: int, expected: Situation, strategy: PlaceStrategy) -> list[Place]:
+        """Where the body has to be for its next action."""
+        action, coarse = self._task.manoeuvres[later], self._task.contacts[later].boxes
+        if action.parent not in self._task.arms:
+            return self._placements.places(later, expected, coarse, strategy)
+        return [Place(coarse[action.body], Way(0.0))] if strategy == STRATEGIES[0] else []
+
+    def _reach(self, later: int, holder: str, targets: list[Place], grips: Grips) -> Reach:
+        """Configurations for every target, and there for every grip."""
+        tools = [grips.tools(t.pose[:3], rotation_matrix(t.pose[3:])) for t in targets]
+        rotation = np.concatenate([tool[0] for tool in tools])
+        contact = np.concatenate([tool[1] for tool in tools])
+        ways = [t.way.of(tool[0]) for t, tool in zip(targets, tools, strict=True)]
+        return self._task.reach(
+            later, self._task.arms[holder], rotation, contact, np.concatenate(ways)
+        )
+
+    def _expected(self, index: int, later: int, situation: Situation) -> Situation:
+        """The situation expected at a later action, its body and what stands on it left out."""
+        task, action = self._task, self._task.manoeuvres[later]
+        moved = {between.body for between in task.manoeuvres[index + 1 : later]}
+        moved |= {rider for body in moved for s in task.states for rider in s.carried_by(body)}
+        poses = situation.boxes(task.arms)
+        contact = task.contacts[later]
+        away = {action.body, *task.states[later].carried_by(action.body)}
+        standing = {
+            box: contact.boxes[box] if box in moved else poses[box]
+            for box in task.boxes
+            if box not in away
+        }
+        closing = action.closing
+        opened = {} if closing is None else {closing: FINGER_LIMITS[1]}
+        fingers = {**situation.fingers, **opened}
+        return Situation(task.states[later], contact.q, fingers, standing, {})
+
+    def _possible(
+        self,
+        later: int,
+        holder: str,
+        expected: Situation,
+        targets: list[Place],
+        reach: Reach,
+        grips: Grips,
+        grip: int,
+    ) -> bool:
+        """Whether the body, held so, can be moved on somewhere without collisions."""
+        task, action = self._task, self._task.manoeuvres[later]
+        count = len(grips)
+        holding = replace(expected, carried=self._carried(later, holder, grips, grip))
+        around = holding.around(holder, [(action.body, action.parent)])
+        cost = np.full_like(reach.cost, np.inf)
+        cost[grip::count] = reach.cost[grip::count]
+        for choice in replace(reach, cost=cost).order()[:_FORESEEN]:
+            number, pan, side = choice
+            ends = reach.q[number, :, pan, side]
+            if task.blocked(later, Stage.CONTACT, "at the contact", around, ends):
+                continue
+            left = self._left(later, expected, targets[number // count].pose)
+            if self._can_leave(later, holder, left, reach, choice):
+                return True
+        return False
+
+    def _carried(
+        self, later: int, holder: str, grips: Grips, grip: int
+    ) -> dict[str, tuple[str, Array]]:
+        """The body in the hand, and what stands on it."""
+        task, body = self._task, self._task.manoeuvres[later].body
+        grasp = inverse(matrix_pose(grips.rotation[grip], grips.offset[grip]))
+        coarse = task.contacts[later].boxes
+        riders = {
+            rider: (holder, compose(grasp, compose(inverse(coarse[body]), coarse[rider])))
+            for rider in task.states[later].carried_by(body)
+        }
+        return {body: (holder, grasp), **riders}
+
+    def _left(self, later: int, expected: Situation, target: Array) -> Situation:
+        """When the body has been let go of."""
+        body, opening = self._task.manoeuvres[later].body, self._task.manoeuvres[later].opening
+        opened = [] if opening is None else [Fingers(opening, FINGER_LIMITS[1])]
+        return replace(
+            self._task.after(expected, opened),
+            standing={**expected.standing, body: target},
+            state=self._task.states[later + 1],
+        )
+
+    def _can_leave(
+        self, later: int, holder: str, left: Situation, reach: Reach, choice: tuple[int, int, int]
+    ) -> bool:
+        """Whether the hand, where it is the one that leaves, has a free end of its way out."""
+        task, (number, pan, side) = self._task, choice
+        way_out = task.manoeuvres[later].way_out
+        if way_out.gripper != holder:
+            return True
+        rotation, contact = reach.rotation[number], reach.contact[number]
+        ends = np.array([contact + way.of(rotation) for way in way_out.ways])[:, None]
+        q, valid = task.arms[holder].inverse(rotation, ends, reach.pans[pan] + np.array(PAN_SHIFTS))
+        if not valid[..., side].any():
+            task.record(later, Stage.OFF, "way out out of reach")
+        around = left.around(holder)
+        return not all(
+            task.blocked(later, Stage.LEFT, "after the contact", around, end[None])
+            for end in q[..., side, :][valid[..., side]]
+        )

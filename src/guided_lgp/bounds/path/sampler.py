@@ -1,0 +1,247 @@
+"""The ways to carry out one action: an interpretation of the steps of its declared motion.
+
+For every contact of the hand (grip or place), elbow posture and straight way: first the contact and
+the ends of the straight ways are free, then the ways themselves, then the transits between them.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import islice, product
+
+import numpy as np
+
+from guided_lgp.bounds.path.contacts import Contacts, ContactSampler
+from guided_lgp.bounds.path.ik import continuous_near
+from guided_lgp.bounds.path.motions import Motion, Tool
+from guided_lgp.bounds.path.situation import Attach, Fingers, Release, Situation, Step
+from guided_lgp.bounds.path.spaces import wound
+from guided_lgp.bounds.path.task import PAN_SHIFTS, Choice, Outcome, Reach, Stage, Task
+from guided_lgp.bounds.results import Array
+from guided_lgp.poses import compose, inverse, pose, rotation_matrix, yaw_of
+from guided_lgp.scene.pr2 import FINGER_LIMITS, arm_slice, finger_joint
+
+_OUTCOMES = 4
+"""Ways to carry out an action that are passed on, before an earlier action is changed."""
+_CONFIGURATIONS = 150
+"""Configurations of contact and elbow that are looked at per action and batch of contacts."""
+_ELBOWS = 3
+"""Elbow postures per contact whose motions are planned."""
+
+
+class OutcomeSampler:
+    """Generates the ways to carry out the actions of one task."""
+
+    def __init__(self, task: Task) -> None:
+        self._task = task
+        self._contacts = ContactSampler(task)
+        self.visits = 0
+        """Actions begun so far, in how many situations."""
+
+    def outcomes(self, index: int, situation: Situation) -> Iterator[Outcome]:
+        """Ways to carry out an action, each free of collisions from rest to rest."""
+        self.visits += 1
+        action = self._task.manoeuvres[index]
+        others = [gripper for gripper in self._task.arms if gripper != action.gripper]
+        for steps, presented in self._presented(index, situation, action.presented):
+            opening = self._opening(presented, action.closing)
+            opened = self._task.after(presented, opening)
+            for outcome in islice(self._carried_out(index, opened), _OUTCOMES):
+                rest = self._home(index, Stage.ASIDE, outcome.situation, others)
+                if rest is not None:
+                    yield Outcome(
+                        (*steps, *opening, *outcome.steps, *rest),
+                        self._task.after(outcome.situation, rest),
+                        outcome.contact,
+                    )
+
+    def backjump_target(self, index: int) -> int:
+        """The earlier action to change when none of the ways of this one works.
+
+        What the motion depends on is how the body is held, if it is.
+        """
+        task, body = self._task, self._task.manoeuvres[index].body
+        if task.states[index].holder(body) is None:
+            return index - 1
+        return next(
+            (
+                j
+                for j in range(index - 1, -1, -1)
+                if body == task.manoeuvres[j].body
+                or body in [task.root(j, shown) for shown in task.manoeuvres[j].presented]
+            ),
+            -1,
+        )
+
+    def _presented(
+        self, index: int, situation: Situation, bodies: Sequence[str]
+    ) -> Iterator[tuple[tuple[Step, ...], Situation]]:
+        """Bring what is held and needed, or carries what is, to where the action takes place."""
+        if not bodies:
+            yield (), situation
+            return
+        for steps, presented in self._present(index, situation, bodies[0]):
+            for more, final in self._presented(index, presented, bodies[1:]):
+                yield (*steps, *more), final
+
+    def _present(
+        self, index: int, situation: Situation, body: str
+    ) -> Iterator[tuple[tuple[Step, ...], Situation]]:
+        task = self._task
+        root = task.root(index, body)
+        holder = situation.state.holder(root)
+        if holder is None:
+            yield (), situation
+            return
+        loaded = situation.loaded(holder)
+        if loaded:
+            yield (), situation
+        tool = compose(
+            _upright(task.contacts[index].boxes[root]), inverse(situation.carried[root][1])
+        )
+        rotation, nowhere = rotation_matrix(tool[3:])[None], np.zeros((1, 3))
+        reach = task.reach(index, task.arms[holder], rotation, tool[None, :3], nowhere)
+        if loaded:
+            reach = task.level_reach(reach, holder, situation)
+        now, around = situation.q[arm_slice(holder)], situation.around(holder)
+        for _, pan, side in reach.order()[: 2 * _ELBOWS]:
+            goal = continuous_near(reach.q[0, 0, pan, side], now)
+            if task.blocked(index, Stage.REACH, "presenting", around, goal[None]):
+                continue
+            steps = task.transit(around, now, goal, loaded)
+            if steps is None:
+                task.record(index, Stage.CONTACT, f"no motion found to present {body}")
+                continue
+            yield tuple(steps), task.after(situation, steps)
+
+    def _opening(self, situation: Situation, gripper: str | None) -> tuple[Step, ...]:
+        """Fingers that are to close open before."""
+        if gripper is None or situation.fingers[gripper] == FINGER_LIMITS[1]:
+            return ()
+        return (Fingers(gripper, FINGER_LIMITS[1]),)
+
+    def _carried_out(self, index: int, situation: Situation) -> Iterator[Outcome]:
+        """Carry out an action at the likeliest contacts that are within reach."""
+        task = self._task
+        gripper = task.manoeuvres[index].gripper
+        for contacts in self._contacts.contacts(index, situation):
+            reach = task.reach(
+                index, task.arms[gripper], contacts.rotation, contacts.position, contacts.way
+            )
+            if situation.loaded(gripper):
+                reach = task.level_reach(reach, gripper, situation)
+            if np.isfinite(reach.cost).any():
+                yield from self._at(index, situation, contacts, reach)
+            else:
+                task.record(index, Stage.REACH, "no inverse kinematics")
+
+    def _at(
+        self, index: int, situation: Situation, contacts: Contacts, reach: Reach
+    ) -> Iterator[Outcome]:
+        """Carry out an action with the nearest configurations that are free of collisions."""
+        task, action = self._task, self._task.manoeuvres[index]
+        at = situation.around(action.gripper, [(action.body, action.parent)])
+        off = situation.around(action.gripper)
+        attempts = np.zeros(len(reach.cost), dtype=int)
+        for choice in reach.order(contacts.cost)[:_CONFIGURATIONS]:
+            number, pan, side = choice
+            if attempts[number] >= _ELBOWS:
+                continue
+            contact, before = reach.q[number, :, None, pan, side]
+            if task.blocked(index, Stage.CONTACT, "at the contact", at, contact):
+                continue
+            if task.blocked(index, Stage.OFF, "before the contact", off, before):
+                continue
+            if not contacts.possible(number):
+                continue
+            attempts[number] += 1
+            outcome = self._planned(index, situation, reach, choice)
+            if outcome is not None:
+                attempts[number] = _ELBOWS
+                yield outcome
+
+    def _planned(
+        self, index: int, situation: Situation, reach: Reach, choice: Choice
+    ) -> Outcome | None:
+        """Plan all motions of an action from one configuration, straight lines first."""
+        task, action = self._task, self._task.manoeuvres[index]
+        gripper, leaving = action.gripper, action.way_out.gripper
+        start, tool = situation.q[arm_slice(gripper)], reach.tool(choice)
+        around = situation.around(gripper, [(action.body, action.parent)])
+        line = task.mover.line(around, tool, reach.way[choice[0]])
+        if isinstance(line, str):
+            task.record(index, Stage.LINE_IN, f"{line} on the way in")
+            return None
+        reached = task.after(situation, [Motion(gripper, line[::-1])])
+        switch = self._switch(index, reached)
+        switched = replace(task.after(reached, switch), state=task.states[index + 1])
+        if leaving != gripper:
+            tool = task.mover.tool(leaving, switched.q[arm_slice(leaving)])
+        for out in self._ways_out(index, switched, tool):
+            goal = continuous_near(line[-1], start)
+            come = task.transit(situation.around(gripper), start, goal, situation.loaded(gripper))
+            if come is None:
+                task.record(index, Stage.TRANSIT, f"no motion found to {action.name} {action.body}")
+                return None
+            inward = Motion(gripper, wound(line[::-1], come[-1].path[-1]))
+            left = task.after(switched, [inward])
+            outward = Motion(leaving, wound(out, left.q[arm_slice(leaving)]))
+            left = task.after(left, [outward])
+            go = self._home(index, Stage.HOME, left, action.homes)
+            if go is not None:
+                steps = (*come, inward, *switch, outward, *go)
+                return Outcome(steps, task.after(left, go), reached.keyframe(task.arms))
+        return None
+
+    def _ways_out(self, index: int, switched: Situation, tool: Tool) -> Iterator[Array]:
+        """Free straight ways of the leaving arm, whose end is free without any contact."""
+        task, action = self._task, self._task.manoeuvres[index]
+        around = switched.around(action.way_out.gripper, [(action.body, self._parent(index))])
+        at_end = switched.around(action.way_out.gripper)
+        for way, shift in product(action.way_out.ways, PAN_SHIFTS):
+            out = task.mover.line(around, tool, way.of(tool.rotation), shift)
+            if isinstance(out, str):
+                task.record(index, Stage.LINE_OUT, f"{out} on the way out")
+                continue
+            if not task.blocked(index, Stage.OUT, "after the contact", at_end, out[-1:]):
+                yield out
+
+    def _switch(self, index: int, situation: Situation) -> tuple[Step, ...]:
+        """Fingers close; the body and what stands on it change their carrier; fingers open."""
+        task, action = self._task, self._task.manoeuvres[index]
+        bodies = (action.body, *situation.state.carried_by(action.body))
+        carrier = task.carrier(index + 1, action.body)
+        steps: list[Step] = []
+        if action.closing is not None:
+            width = min(task.boxes[action.body].size[:2])
+            steps.append(Fingers(action.closing, finger_joint(width)))
+        if action.body in situation.carried:
+            steps.append(Release(bodies))
+        if carrier is not None:
+            steps.append(Attach(bodies, carrier))
+        if action.opening is not None:
+            steps.append(Fingers(action.opening, FINGER_LIMITS[1]))
+        return tuple(steps)
+
+    def _home(
+        self, index: int, stage: Stage, situation: Situation, grippers: Sequence[str]
+    ) -> tuple[Step, ...] | None:
+        """Send arms to their side, one after the other."""
+        steps: list[Step] = []
+        for gripper in grippers:
+            motions = self._task.home(self._task.after(situation, steps), gripper)
+            if motions is None:
+                self._task.record(index, stage, f"no motion found for {gripper} to its side")
+                return None
+            steps += motions
+        return tuple(steps)
+
+    def _parent(self, index: int) -> str:
+        """What holds or supports the body of an action before it."""
+        state, body = self._task.states[index], self._task.manoeuvres[index].body
+        parent = state.holder(body) or state.support_of(body)
+        assert parent is not None
+        return parent
+
+
+def _upright(box: Array) -> Array:
+    return pose(box[:3], float(yaw_of(box)))

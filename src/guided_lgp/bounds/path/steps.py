@@ -1,0 +1,153 @@
+"""The declared motion of an instruction as geometry: which arm goes where along which lines.
+
+A motion is a list of steps, in this order:
+
+- ``present(x)``: the arm that holds x, or what x stands on, brings it where it is needed;
+- ``transit(g)``: the acting arm comes to the beginning of its way in;
+- ``line_in(g, ...)``: its tool goes straight to the contact;
+- ``switch(close=g, open=g)``: fingers close and open, and the body changes its parent;
+- ``line_out(g, ...)``: an arm leaves straight;
+- ``home(g)``: an arm goes to its side, unless it carries a stack, which stays where it is.
+
+There may be any number of ``present`` and ``home``, and one of each other. Lines name their
+direction and length (m): ``back`` against the approach of the hand, ``up`` or ``down`` along the
+vertical; ``otherwise`` names a direction for further ways.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from guided_lgp.bounds.path.declared import GroundInstruction, GroundTerm
+from guided_lgp.bounds.results import Array
+from guided_lgp.errors import InputError
+
+_ONCE = ("transit", "line_in", "switch", "line_out")
+STEPS = ("present", *_ONCE, "home")
+"""Every step, in the order in which a motion may have them."""
+_DIRECTIONS = ("back", "down", "up")
+_PAST = 0.11
+"""Length (m) of the way up on which an open hand leaves what it held, however deep."""
+UP = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True)
+class Way:
+    """A displacement of the tool: length x (up x vertical - back x approach + aside)."""
+
+    length: float
+    up: float = 0.0
+    back: float = 0.0
+    aside: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def of(self, rotation: Array) -> Array:
+        """The displacement (..., 3) in m for rotations (..., 3, 3) of the tool frame."""
+        bearing = self.up * UP - self.back * rotation[..., :, 0] + self.aside
+        return np.asarray(self.length * bearing)
+
+
+_ASIDE = tuple(
+    Way(1.0, up=0.05, aside=(x, y, 0.0))
+    for x, y in ((0.07, 0.0), (0.0, 0.07), (-0.07, 0.0), (0.0, -0.07))
+)
+"""Ways (m) up from a place past an arm that leans over it."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """A straight line of a tool, which does not turn. Its ways lead away from the contact."""
+
+    gripper: str
+    ways: tuple[Way, ...]
+    aside: tuple[Way, ...] = ()
+    """Further ways, for where none of the first is free."""
+
+
+@dataclass(frozen=True)
+class Manoeuvre:
+    """The motion of an action."""
+
+    name: str
+    """Of the instruction."""
+    body: str
+    """What is moved ..."""
+    parent: str
+    """... and what holds or supports it afterwards."""
+    presented: tuple[str, ...]
+    way_in: Line
+    way_out: Line
+    closing: str | None
+    opening: str | None
+    homes: tuple[str, ...]
+
+    @property
+    def gripper(self) -> str:
+        """Whose arm makes the contact."""
+        return self.way_in.gripper
+
+
+def manoeuvre(declared: GroundInstruction) -> Manoeuvre:
+    """Read the declared motion of an action.
+
+    Raises:
+        InputError: a step is unknown, missing or out of its order, or lacks what it needs.
+    """
+    name, motion = declared.action.instruction, declared.motion
+    where = f"motion of {name}"
+    names = [step.name for step in motion]
+    for step in names:
+        if step not in STEPS:
+            raise InputError(f"{where}: {step}", "is an unknown step", ", ".join(STEPS))
+    if names != sorted(names, key=STEPS.index) or any(names.count(name) != 1 for name in _ONCE):
+        accepted = f"present ..., {', '.join(_ONCE)}, home ..."
+        raise InputError(f"{where}: {', '.join(names)}", "are not the steps of a motion", accepted)
+    once = {step.name: step for step in motion}
+    if once["line_in"].symbols != once["transit"].symbols:
+        raise InputError(f"{where}: line_in", "moves another arm than transit")
+    fingers = {hand: str(gripper) for hand, gripper in once["switch"].options.items()}
+    return Manoeuvre(
+        name,
+        declared.body,
+        declared.parent,
+        presented=tuple(step.symbols[0] for step in motion if step.name == "present"),
+        way_in=_way_in(where, once["line_in"]),
+        way_out=_way_out(where, once["line_out"]),
+        closing=fingers.get("close"),
+        opening=fingers.get("open"),
+        homes=tuple(step.symbols[0] for step in motion if step.name == "home"),
+    )
+
+
+def _way_in(where: str, step: GroundTerm) -> Line:
+    direction, length, otherwise = _direction(where, step)
+    ways = [_straight(name, length) for name in (direction, otherwise) if name]
+    return Line(step.symbols[0], tuple(ways), _ASIDE if direction == "down" else ())
+
+
+def _way_out(where: str, step: GroundTerm) -> Line:
+    """What is lifted may also leave its support backwards, or half as far; a hand that cannot
+    leave backwards rises at the same time, or rises past the body.
+    """
+    direction, length, otherwise = _direction(where, step)
+    ways = [_straight(direction, length)]
+    if direction == "up":
+        ways += [Way(length, up=0.8, back=0.6), Way(0.5 * length, up=1.0)]
+    if otherwise:
+        ways += [Way(length, up=0.5, back=1.0), Way(_PAST, up=1.0)]
+    return Line(step.symbols[0], tuple(ways))
+
+
+def _direction(where: str, step: GroundTerm) -> tuple[str, float, str]:
+    """Direction and length (m) of a straight line, and the direction of another way, if any."""
+    given = {name: length for name, length in step.options.items() if name != "otherwise"}
+    otherwise = str(step.options.get("otherwise", ""))
+    known = set(given) <= set(_DIRECTIONS) and (not otherwise or otherwise in _DIRECTIONS)
+    if len(given) != 1 or not known or not all(isinstance(v, float) for v in given.values()):
+        accepted = f"one of {', '.join(_DIRECTIONS)} with a length in m, otherwise=one of them"
+        raise InputError(f"{where}: {step.name}", "has no direction", accepted)
+    ((direction, length),) = given.items()
+    return direction, float(length), otherwise
+
+
+def _straight(direction: str, length: float) -> Way:
+    return Way(length, back=1.0) if direction == "back" else Way(length, up=1.0)
