@@ -125,8 +125,8 @@ def _goals(state: State, skeleton: Skeleton) -> tuple[Goal, ...]:
     """Everything that should hold after a sequence."""
     for action in skeleton:
         state = successor(state, action)
-    held = (Goal("held", box) for box, _ in state.held)
-    return (*held, *(Goal("on", box, table) for box, table in state.support))
+    held = (Goal("held", (box,)) for box, _ in state.held)
+    return (*held, *(Goal("on", (box, table)) for box, table in state.support))
 
 
 if __name__ == "__main__":

@@ -10,8 +10,7 @@ from guided_lgp import cli, load_scene, plan
 from guided_lgp.bounds.results import CoarseResult, Failure, PathResult
 from guided_lgp.errors import InputError
 from guided_lgp.explanation import ObservedBounds, Obstacle
-from guided_lgp.logic import Action, Skeleton, State, parse_objective
-from guided_lgp.logic.domain import parse_skeleton
+from guided_lgp.logic import Action, Skeleton, State, parse_objective, parse_skeleton
 from guided_lgp.planning import PlanningResult
 from guided_lgp.policy.inference import POLICIES
 from guided_lgp.search.result import Times
@@ -56,7 +55,7 @@ def test_equal_obstacles_are_counted_and_the_shortest_sequence_is_the_example() 
             "(grasp pr2R red)": Failure(0, "reach pr2R red", 0.02, "9 starts"),
         }
     )
-    assert found.action == Action("grasp", "pr2R", "red")
+    assert found.action == Action("grasp", ("pr2R", "red"))
     assert (found.sequences, found.example, found.violation) == (2, (found.action,), 0.02)
     assert str(found) == ("(grasp pr2R red): action 1: reach pr2R red violated by 0.02 (9 starts)")
 

@@ -5,8 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from guided_lgp.bounds.results import CoarseResult, Failure, PathResult
-from guided_lgp.logic import Action, Objective, Skeleton, State, format_skeleton
-from guided_lgp.logic.domain import progress
+from guided_lgp.logic import Action, Objective, Skeleton, State, format_skeleton, progress
 from guided_lgp.search.bounds import Bounds
 
 

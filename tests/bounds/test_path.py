@@ -120,7 +120,7 @@ def test_a_place_in_the_way_is_chosen_anew() -> None:
     placed = result.at_switch[1].boxes["red"]
     assert np.linalg.norm(placed[:2] - [0.6, 0.4]) > 0.07
     final = progress(SCENE.state, result.skeleton)
-    assert final.satisfies(Goal("on", "red", "tab1"))
+    assert final.satisfies(Goal("on", ("red", "tab1")))
 
 
 def test_failure_names_the_action_and_what_was_tried() -> None:

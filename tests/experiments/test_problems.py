@@ -2,8 +2,9 @@
 
 import pytest
 
+from guided_lgp.domains import load_domain
 from guided_lgp.experiments.problems import PROBLEMS, Problem
-from guided_lgp.logic import Symbols, contradiction, format_objective
+from guided_lgp.logic import contradiction, format_objective
 from guided_lgp.logic.strips import facts, goal_facts, relaxed_operators
 from guided_lgp.scene import generate
 from guided_lgp.search.landmark_cut import LandmarkCut
@@ -36,7 +37,9 @@ def test_objectives_need_the_stated_number_of_actions(problem: Problem) -> None:
 
 
 def test_reduced_branching() -> None:
-    symbols = Symbols(("pr2L", "pr2R"), ("red", "green", "blue"), ("tab1", "tab2", "tray"))
+    symbols = load_domain().symbols(
+        gripper=("pr2L", "pr2R"), box=("red", "green", "blue"), table=("tab1", "tab2", "tray")
+    )
     starred = {problem.name for problem in PROBLEMS if problem.reduced}
     assert starred == {"b.1", "c.1", "d.1"}
     for problem in PROBLEMS:

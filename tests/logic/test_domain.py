@@ -4,12 +4,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from guided_lgp.domains import load_domain
 from guided_lgp.errors import InputError
 from guided_lgp.logic import (
     Action,
     Goal,
     State,
-    Symbols,
     applicable_actions,
     format_skeleton,
     parse_skeleton,
@@ -17,7 +17,9 @@ from guided_lgp.logic import (
     successor,
 )
 
-SETUP_A = Symbols(("pr2L", "pr2R"), ("red", "green", "blue"), ("tab1", "tab2"))
+SETUP_A = load_domain().symbols(
+    gripper=("pr2L", "pr2R"), box=("red", "green", "blue"), table=("tab1", "tab2")
+)
 ON_TAB1 = State.of({"red": "tab1", "green": "tab1", "blue": "tab1"})
 
 
@@ -50,15 +52,15 @@ def test_no_place_on_what_stands_on_the_box() -> None:
 
 def test_place_on_a_held_box_and_grasp_under_a_load_are_legal() -> None:
     state = progress(ON_TAB1, parse_skeleton("(grasp pr2L red) (grasp pr2R green)"))
-    assert Action("place", "pr2R", "green", "red") in list(applicable_actions(state, SETUP_A))
+    assert Action("place", ("pr2R", "green", "red")) in list(applicable_actions(state, SETUP_A))
     tower = State.of({"red": "tab1", "green": "red", "blue": "tab1"})
-    assert Action("grasp", "pr2L", "red") in list(applicable_actions(tower, SETUP_A))
+    assert Action("grasp", ("pr2L", "red")) in list(applicable_actions(tower, SETUP_A))
 
 
 def test_goal_on_does_not_hold_while_the_box_is_held() -> None:
     held = progress(ON_TAB1, parse_skeleton("(grasp pr2L red)"))
-    assert held.satisfies(Goal("held", "red"))
-    assert not held.satisfies(Goal("on", "red", "tab1"))
+    assert held.satisfies(Goal("held", ("red",)))
+    assert not held.satisfies(Goal("on", ("red", "tab1")))
 
 
 def test_skeletons_survive_writing_and_reading() -> None:
@@ -69,7 +71,7 @@ def test_skeletons_survive_writing_and_reading() -> None:
 @pytest.mark.parametrize("text", ["(grasp pr2L)", "(push pr2L red)", "(place pr2L red)", "grasp"])
 def test_bad_actions_are_named(text: str) -> None:
     with pytest.raises(InputError, match="is not an action"):
-        Action.parse(text)
+        load_domain().check_action(Action.parse(text))
 
 
 @given(st.lists(st.integers(min_value=0), max_size=30))

@@ -2,10 +2,10 @@
 
 import pytest
 
+from guided_lgp.domains import load_domain
 from guided_lgp.errors import InputError
 from guided_lgp.logic import (
     State,
-    Symbols,
     one_goal_objectives,
     parse_objective,
     two_goal_objectives,
@@ -13,7 +13,9 @@ from guided_lgp.logic import (
     validate_objective,
 )
 
-SETUP_A = Symbols(("pr2L", "pr2R"), ("red", "green", "blue"), ("tab1", "tab2"))
+SETUP_A = load_domain().symbols(
+    gripper=("pr2L", "pr2R"), box=("red", "green", "blue"), table=("tab1", "tab2")
+)
 START = State.of({"red": "tab1", "green": "tab1", "blue": "tab2"})
 
 

@@ -94,5 +94,5 @@ def action(text: str, symbols: Symbols) -> Action:
     names = {name.lower(): name for name in (*symbols.grippers, *symbols.tables)}
     schema, gripper, box, target, *_ = text.strip("()").split()
     if schema == "take":
-        return Action("grasp", names[gripper], names[box])
-    return Action("place", names[gripper], names[box], names[target])
+        return Action("grasp", (names[gripper], names[box]))
+    return Action("place", (names[gripper], names[box], names[target]))

@@ -13,6 +13,7 @@ from unified_planning.io import PDDLReader
 from unified_planning.model import FNode
 from unified_planning.shortcuts import PlanValidator, Problem, get_environment
 
+from guided_lgp.domains import load_domain
 from guided_lgp.errors import InputError
 from guided_lgp.logic import (
     Goal,
@@ -31,8 +32,12 @@ from guided_lgp.search.landmark_cut import LandmarkCut
 from guided_lgp.search.tree import StateSpace, distances
 
 GRIPPERS = ("pr2L", "pr2R")
-THREE = Symbols(GRIPPERS, ("red", "green", "blue"), ("tab1", "tab2"))
-FOUR = Symbols(GRIPPERS, ("red", "green", "blue", "yellow"), ("tab1", "tab2", "tray"))
+THREE = load_domain().symbols(
+    gripper=GRIPPERS, box=("red", "green", "blue"), table=("tab1", "tab2")
+)
+FOUR = load_domain().symbols(
+    gripper=GRIPPERS, box=("red", "green", "blue", "yellow"), table=("tab1", "tab2", "tray")
+)
 PAIRS = {THREE: 190, FOUR: 10}
 
 

@@ -1,6 +1,7 @@
 import pytest
 from synthetic import Enumeration, enumerate_world
 
+from guided_lgp.domains import load_domain
 from guided_lgp.logic import Symbols
 
 
@@ -11,4 +12,6 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Enumeration:
 
 @pytest.fixture
 def symbols() -> Symbols:
-    return Symbols(("pr2L", "pr2R"), ("red", "green", "blue"), ("tab1", "tab2"))
+    return load_domain().symbols(
+        gripper=("pr2L", "pr2R"), box=("red", "green", "blue"), table=("tab1", "tab2")
+    )

@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 from synthetic import Enumeration, make_scene, positions_along
 
+from guided_lgp.domains import load_domain
 from guided_lgp.errors import InputError
 from guided_lgp.logic import (
     Action,
@@ -43,15 +44,16 @@ def dataset(world: Enumeration, objectives: list[Objective]) -> Dataset:
 def decode_goals(code: np.ndarray, symbols: Symbols) -> Objective:
     goals = []
     for kind, box, table in ((g[:2], g[2:5], g[5:]) for g in code.reshape(2, 10)):
-        on = symbols.tables[int(table.argmax())] if table.any() else None
-        goals.append(Goal(("held", "on")[int(kind.argmax())], symbols.boxes[int(box.argmax())], on))
+        on = (symbols.tables[int(table.argmax())],) if table.any() else ()
+        names = (symbols.boxes[int(box.argmax())], *on)
+        goals.append(Goal(("held", "on")[int(kind.argmax())], names))
     return tuple(goals)
 
 
 def decode_action(classes: np.ndarray, symbols: Symbols) -> Action:
     instruction, gripper, box, table = classes.tolist()
-    on = symbols.tables[table] if table >= 0 else None
-    return Action(INSTRUCTIONS[instruction], symbols.grippers[gripper], symbols.boxes[box], on)
+    on = (symbols.tables[table],) if table >= 0 else ()
+    return Action(INSTRUCTIONS[instruction], (symbols.grippers[gripper], symbols.boxes[box], *on))
 
 
 def expected_samples(
@@ -134,7 +136,9 @@ def test_variant_with_boxes_in_random_order(
     for state, goals in zip(variant.sample_state, variant.sample_goals, strict=True):
         for boxes in permutations(symbols.boxes):
             order = [0, 1, *(2 + boxes.index(name) for name in symbols.boxes), 5, 6]
-            named = Symbols(symbols.grippers, boxes, symbols.surfaces)
+            named = load_domain().symbols(
+                gripper=symbols.grippers, box=boxes, table=symbols.surfaces
+            )
             sample = (
                 decode_goals(variant.goals[goals], named),
                 variant.states[state].reshape(7, 3)[order].tobytes(),
@@ -181,7 +185,7 @@ def test_variant_with_the_named_boxes_first(
     for state, goals in zip(variant.sample_state, variant.sample_goals, strict=True):
         for boxes in permutations(symbols.boxes):
             order = [0, 1, *(2 + boxes.index(name) for name in symbols.boxes), 5, 6]
-            own = Symbols(symbols.grippers, boxes, symbols.surfaces)
+            own = load_domain().symbols(gripper=symbols.grippers, box=boxes, table=symbols.surfaces)
             decoded = decode_goals(variant.goals[goals], own)
             world_order = variant.states[state].reshape(7, 3)[order].tobytes()
             sample = decoded, world_order, decode_action(variant.actions[state], own)

@@ -1,15 +1,18 @@
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
+from guided_lgp.domains import load_domain
 from guided_lgp.errors import InputError
 from guided_lgp.logic import Action, State, Symbols, parse_objective
 from guided_lgp.policy.encoding import CHAINS, NOWHERE, Encoding
 
 ENCODING = Encoding()
 ON_TABLES = State.of({"red": "tab1", "green": "tab1", "blue": "tab2"})
-MANY = Symbols(("pr2L", "pr2R"), ("red", "green", "blue", "pink", "grey"), ("tab1", "tab2", "tray"))
+MANY = load_domain().symbols(
+    gripper=("pr2L", "pr2R"),
+    box=("red", "green", "blue", "pink", "grey"),
+    table=("tab1", "tab2", "tray"),
+)
 ON_TAB1 = State.of(dict.fromkeys(MANY.boxes, "tab1"))
 
 
@@ -98,9 +101,9 @@ def test_boxes_of_the_goals_then_held_ones_then_others() -> None:
     objective = parse_objective(["(on pink tray)"])
     slots = ENCODING.fill(objective, state, MANY)
     assert slots.boxes == ("pink", "grey", "red")
-    assert ENCODING.encode_action(slots, Action("grasp", "pr2R", "green")) is None
-    assert ENCODING.encode_action(slots, Action("place", "pr2L", "grey", "green")) is None
-    assert ENCODING.encode_action(slots, Action("place", "pr2L", "grey", "pink")) == (1, 0, 1, 2)
+    assert ENCODING.encode_action(slots, Action("grasp", ("pr2R", "green"))) is None
+    assert ENCODING.encode_action(slots, Action("place", ("pr2L", "grey", "green"))) is None
+    assert ENCODING.encode_action(slots, Action("place", ("pr2L", "grey", "pink"))) == (1, 0, 1, 2)
 
 
 @pytest.mark.parametrize(
@@ -117,7 +120,7 @@ def test_tables_of_the_goals_first(goals: list[str], surfaces: tuple[str, ...]) 
 
 
 def test_slots_without_a_symbol_are_empty_and_zero() -> None:
-    symbols = Symbols(("pr2L", "pr2R"), ("red",), ("tab1",))
+    symbols = load_domain().symbols(gripper=("pr2L", "pr2R"), box=("red",), table=("tab1",))
     state = State.of({"red": "tab1"})
     slots = ENCODING.fill(parse_objective(["(held red)"]), state, symbols)
     assert slots.symbols == ("pr2L", "pr2R", "red", None, None, "tab1", None)
@@ -127,7 +130,9 @@ def test_slots_without_a_symbol_are_empty_and_zero() -> None:
 
 
 def test_normalised_positions_by_hand() -> None:
-    symbols = Symbols(("pr2L", "pr2R"), ("red", "green"), ("tab1", "tab2"))
+    symbols = load_domain().symbols(
+        gripper=("pr2L", "pr2R"), box=("red", "green"), table=("tab1", "tab2")
+    )
     encoding = Encoding(centre=(0.5, 0.0, 1.0) * 7, scale=(2.0, 1.0, 0.5) * 7)
     slots = encoding.fill((), State.of({"red": "tab1", "green": "tab1"}), symbols)
     positions = {name: np.array([2.5, 1.0, 0.0]) for name in slots.symbols if name}
@@ -178,7 +183,9 @@ def test_named_boxes_fill_the_first_slots(symbols: Symbols) -> None:
     assert boxes("(held grey)", "(on green tray)") == ("grey", "green", "red")
     held = State.of({box: "tab1" for box in MANY.boxes if box != "pink"}, {"pink": "pr2L"})
     assert boxes("(on blue tab2)", state=held) == ("blue", "pink", "red")
-    fewer = Symbols(symbols.grippers, ("red", "green"), symbols.surfaces)
+    fewer = load_domain().symbols(
+        gripper=symbols.grippers, box=("red", "green"), table=symbols.surfaces
+    )
     slots = encoding.fill(parse_objective(["(held green)"]), ON_TABLES, fewer)
     assert slots.boxes == ("green", "red", None)
 
@@ -186,7 +193,7 @@ def test_named_boxes_fill_the_first_slots(symbols: Symbols) -> None:
 def test_what_the_state_means_by_hand(symbols: Symbols) -> None:
     encoding = Encoding(meaning=True)
     state = State.of({"red": "tray", "green": "red"}, {"blue": "pr2R"})
-    three = replace(MANY, boxes=MANY.boxes[:3])
+    three = load_domain().symbols(gripper=MANY.grippers, box=MANY.boxes[:3], table=MANY.surfaces)
     slots = encoding.fill(parse_objective(["(held blue)", "(on red tab1)"]), state, three)
     assert encoding.encode_supports(slots, state) == (NOWHERE, 2, -2), "the tray has no slot"
     positions = dict.fromkeys((*MANY.grippers, *MANY.boxes, *MANY.surfaces), np.zeros(3))

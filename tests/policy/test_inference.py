@@ -23,8 +23,8 @@ from guided_lgp.scene import Scene
 GRIPPERS, BOXES = ("pr2L", "pr2R"), ("red", "green", "blue")
 TABLES = ("tab1", "tab2", *BOXES)
 ACTIONS = [
-    *(Action("grasp", *names) for names in product(GRIPPERS, BOXES)),
-    *(Action("place", *names) for names in product(GRIPPERS, BOXES, TABLES)),
+    *(Action("grasp", names) for names in product(GRIPPERS, BOXES)),
+    *(Action("place", names) for names in product(GRIPPERS, BOXES, TABLES)),
 ]
 Situation = tuple[Objective, State, dict[str, Array]]
 
@@ -119,7 +119,7 @@ def test_an_action_on_a_symbol_without_slot_has_the_floor(models: Path, scene: S
     larger = scene.model_copy(update={"boxes": (*scene.boxes, pink)})
     positions = positions_along(larger, ())[0]
     policy = load_policy(models)
-    actions = [Action("grasp", "pr2L", box) for box in ("red", "pink")]
+    actions = [Action("grasp", ("pr2L", box)) for box in ("red", "pink")]
     for goal, floor in (("(held red)", [False, True]), ("(held pink)", [False, False])):
         objective = parse_objective([goal])
         scores = policy.log_probabilities(objective, larger.state, positions, actions)

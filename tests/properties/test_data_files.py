@@ -27,9 +27,10 @@ from hypothesis import strategies as st
 from safetensors.numpy import load_file, save_file
 
 from guided_lgp.bounds.plan_file import read_plan
+from guided_lgp.domains import load_domain
 from guided_lgp.experiments.enumerate_sequences import SHORTEST, VERDICTS
 from guided_lgp.experiments.files import read_table, write_table
-from guided_lgp.logic import Symbols, two_goal_objectives
+from guided_lgp.logic import two_goal_objectives
 from guided_lgp.policy.dataset import Dataset, load_dataset
 from guided_lgp.policy.encoding import CHAINS, Encoding
 from guided_lgp.policy.inference import load_policy
@@ -39,7 +40,9 @@ from guided_lgp.report.inputs import read_object
 from guided_lgp.scene import GeneratedScenes, generate, load_scene, load_scenes
 from guided_lgp.scene.setups import SETUPS
 
-SYMBOLS = Symbols(("pr2L", "pr2R"), ("red", "green", "blue"), ("tab1", "tab2"))
+SYMBOLS = load_domain().symbols(
+    gripper=("pr2L", "pr2R"), box=("red", "green", "blue"), table=("tab1", "tab2")
+)
 OBJECTIVES = tuple(two_goal_objectives(SYMBOLS)[:5])
 STAGE = "some_stage"
 

@@ -1,8 +1,9 @@
 """Goals and objectives: accepted exactly if some arrangement of the boxes fulfils them."""
 
 import io
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import redirect_stderr, redirect_stdout
+from functools import partial
 from itertools import product
 
 import pytest
@@ -11,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from guided_lgp import cli
+from guided_lgp.domains import load_domain
 from guided_lgp.logic import (
     Goal,
     Objective,
@@ -24,11 +26,24 @@ from guided_lgp.logic import (
 )
 from guided_lgp.scene import GRIPPERS, Scene
 
+DOMAIN = load_domain()
 BOXES, TABLES = ("red", "green", "blue"), ("tab1", "tab2")
 words = st.one_of(
     st.sampled_from((*BOXES, *TABLES, *GRIPPERS, "held", "on", "place", "shelf", *UNICODE_NAMES)),
     st.text(max_size=6),
 )
+
+
+def accepted(check: Callable[[], None], *names: str) -> bool:
+    """Whether a check passes; if not, it says so in one line."""
+
+    def passed() -> bool:
+        check()
+        return True
+
+    return answer(passed, *names) is not None
+
+
 phrases = st.one_of(
     st.text(max_size=30),
     st.lists(words, max_size=5).map(lambda found: f"({' '.join(found)})"),
@@ -109,8 +124,9 @@ def test_anything_typed_as_a_goal(texts: list[str]) -> None:
         again = [str(goal) for goal in objective]
         assert parse_objective(again) == objective
         assert format_objective(objective) == " ".join(again)
-        assert all(goal.kind in ("held", "on") for goal in objective)
-        assert all((goal.table is None) == (goal.kind == "held") for goal in objective)
+        for goal in objective:
+            known = (goal.kind, len(goal.symbols)) in (("held", 1), ("on", 2))
+            assert accepted(partial(DOMAIN.check_goal, goal), "goal") == known
 
 
 @examples(100)
@@ -118,18 +134,15 @@ def test_anything_typed_as_a_goal(texts: list[str]) -> None:
 def test_circles_and_too_many_held(names: list[str], unknown: int, scene: Scene) -> None:
     """Boxes on each other in a circle, and as many in the hands, some of them not in the scene."""
     every = [*names, *(f"box{index}" for index in range(unknown))]
-    circle = [Goal("on", *pair) for pair in zip(every, [*every[1:], *every[:1]], strict=True)]
-    held = [Goal("held", name) for name in every]
+    circle = [Goal("on", pair) for pair in zip(every, [*every[1:], *every[:1]], strict=True)]
+    held = [Goal("held", (name,)) for name in every]
 
-    def accepted(goals: list[Goal]) -> bool:
-        def validate() -> bool:
-            validate_objective(tuple(goals), scene.symbols, scene.state)
-            return True
+    def valid(goals: list[Goal]) -> bool:
+        check = partial(validate_objective, tuple(goals), scene.symbols, scene.state)
+        return accepted(check, "goal", "objective")
 
-        return answer(validate, "goal", "objective") is not None
-
-    assert not accepted(circle)
-    assert accepted(held) == (unknown == 0 and len(names) in (1, 2))
+    assert not valid(circle)
+    assert valid(held) == (unknown == 0 and len(names) in (1, 2))
 
 
 actions = st.builds(
@@ -147,7 +160,9 @@ def test_anything_read_as_a_sequence(text: str) -> None:
     """What is read as a skeleton is one from its first character to its last."""
     skeleton = answer(lambda: parse_skeleton(text), "action")
     if skeleton is not None:
-        assert all(action.instruction in ("grasp", "place") for action in skeleton)
+        for action in skeleton:
+            known = (action.instruction, len(action.symbols)) in (("grasp", 2), ("place", 3))
+            assert accepted(partial(DOMAIN.check_action, action), "action") == known
         assert format_skeleton(skeleton).replace(" ", "") == "".join(text.split())
 
 

@@ -1,7 +1,8 @@
 import pandas as pd
 import pytest
 
-from guided_lgp.logic import Goal, Symbols
+from guided_lgp.domains import load_domain
+from guided_lgp.logic import Goal
 from guided_lgp.report import analysis
 from guided_lgp.scene import Box, Scene, Table
 
@@ -91,8 +92,8 @@ def test_without_failures_the_table_is_empty() -> None:
 
 
 def test_novelty_is_up_to_the_names_of_the_boxes() -> None:
-    symbols = Symbols(("pr2L",), ("red", "green"), ("tab1", "tab2"))
-    kinds = analysis.novelty(symbols, [(Goal("held", "red"), Goal("on", "green", "tab1"))])
+    symbols = load_domain().symbols(gripper=("pr2L",), box=("red", "green"), table=("tab1", "tab2"))
+    kinds = analysis.novelty(symbols, [(Goal("held", ("red",)), Goal("on", ("green", "tab1")))])
     assert kinds["(held red) (on green tab1)"] == "seen"
     assert kinds["(held green) (on red tab1)"] == "renamed"
     assert kinds["(held red) (on green tab2)"] == "new"

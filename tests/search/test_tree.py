@@ -4,14 +4,15 @@ import time
 
 import pytest
 
+from guided_lgp.domains import load_domain
 from guided_lgp.logic import State, Symbols, parse_objective, parse_skeleton
 from guided_lgp.search.tree import LogicTree, StateSpace, distances
 
 GRIPPERS = ("pr2L", "pr2R")
 COLOURS = ("red", "green", "blue", "yellow", "orange")
-SETUP_A = Symbols(GRIPPERS, COLOURS[:3], ("tab1", "tab2"))
-REDUCED_B = Symbols(GRIPPERS, COLOURS[:3], ("tray", "tab2"), box_is_table=False)
-SETUP_D = Symbols(GRIPPERS, COLOURS, ("tab1", "tab2", "tray"))
+SETUP_A = load_domain().symbols(gripper=GRIPPERS, box=COLOURS[:3], table=("tab1", "tab2"))
+REDUCED_B = SETUP_A.restricted(table=("tray", "tab2"))
+SETUP_D = load_domain().symbols(gripper=GRIPPERS, box=COLOURS, table=("tab1", "tab2", "tray"))
 
 
 def on_tab1(boxes: int) -> State:

@@ -122,9 +122,9 @@ class Plan(_Document):
             if not attachment.start <= attachment.end < rows:
                 raise ValueError(f"attachment of {attachment.box} lies outside path.times")
         for text in self.objective:
-            Goal.parse(text)
+            symbols.domain.check_goal(Goal.parse(text))
         for text in self.actions:
-            Action.parse(text)
+            symbols.domain.check_action(Action.parse(text))
         return self
 
 

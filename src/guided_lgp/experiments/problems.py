@@ -1,7 +1,7 @@
 """The scalability problems: Table II, and family e beyond it, with their objectives spelled out."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import combinations, pairwise, permutations, product
 
 from guided_lgp.logic import Goal, Objective, Symbols
@@ -27,19 +27,19 @@ class Problem:
         """The symbols for planners without a policy."""
         if not self.reduced:
             return symbols
-        return replace(symbols, surfaces=("tray", "tab2"), box_is_table=False)
+        return symbols.restricted(table=("tray", "tab2"))
 
 
 def tower(boxes: Boxes, table: str | None = None) -> Objective:
     """Boxes on each other, the first one at the top; the last one on a table, if given."""
-    goals = [Goal("on", upper, lower) for upper, lower in pairwise(boxes)]
-    return tuple(goals if table is None else [*goals, Goal("on", boxes[-1], table)])
+    goals = [Goal("on", (upper, lower)) for upper, lower in pairwise(boxes)]
+    return tuple(goals if table is None else [*goals, Goal("on", (boxes[-1], table))])
 
 
 def _stacks_of_three(boxes: Boxes) -> list[Objective]:
     """The ordered towers, and two boxes beside each other on the third."""
     pairs = [
-        (Goal("on", first, below), Goal("on", second, below))
+        (Goal("on", (first, below)), Goal("on", (second, below)))
         for below in boxes
         for first, second in combinations([box for box in boxes if box != below], 2)
     ]
@@ -53,7 +53,7 @@ def _towers_on_tray(boxes: Boxes) -> list[Objective]:
 
 
 def _assignment(supports: Mapping[str, str]) -> Objective:
-    return tuple(Goal("on", box, support) for box, support in supports.items())
+    return tuple(Goal("on", (box, support)) for box, support in supports.items())
 
 
 def _spread(boxes: Boxes, on_tray: Sequence[str]) -> Objective:

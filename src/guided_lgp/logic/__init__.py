@@ -1,16 +1,7 @@
 """Symbols, actions, goals, states and objectives. Pure Python, no numerics."""
 
-from guided_lgp.logic.domain import (
-    Action,
-    Goal,
-    Skeleton,
-    State,
-    applicable_actions,
-    format_skeleton,
-    parse_skeleton,
-    progress,
-    successor,
-)
+from guided_lgp.logic.actions import Action, Goal, Skeleton, format_skeleton, parse_skeleton
+from guided_lgp.logic.domain import Domain, GroundInstruction, GroundTerm
 from guided_lgp.logic.objectives import (
     Objective,
     contradiction,
@@ -23,11 +14,16 @@ from guided_lgp.logic.objectives import (
     unsatisfied,
     validate_objective,
 )
+from guided_lgp.logic.progression import applicable_actions, progress, successor
+from guided_lgp.logic.state import State
 from guided_lgp.logic.symbols import Symbols
 
 __all__ = [
     "Action",
+    "Domain",
     "Goal",
+    "GroundInstruction",
+    "GroundTerm",
     "Objective",
     "Skeleton",
     "State",

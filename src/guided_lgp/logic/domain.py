@@ -1,169 +1,144 @@
-"""Actions, goals and symbolic states of the pick-and-place domain (DESIGN §2).
+"""A domain: types, instructions and goal types, and what a ground action is by its declaration."""
 
-The rules are the permissive ones of the original LGP: placing on a box that another gripper holds
-and grasping a box with others on top are legal; geometry decides whether they are feasible.
-"""
-
-import re
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
 
 from guided_lgp.errors import InputError
+from guided_lgp.logic.actions import Action, Goal
+from guided_lgp.logic.declarations import GoalType, Instruction, Term, Type, Variable
 from guided_lgp.logic.symbols import Symbols
 
 
-@dataclass(frozen=True, order=True)
-class Action:
-    """A high-level action a_k = (instruction, symbols) (paper, Sec. II-A)."""
+@dataclass(frozen=True)
+class GroundTerm:
+    """A term or step of a ground instruction: its variables are symbols."""
 
-    instruction: Literal["grasp", "place"]
-    gripper: str
-    box: str
-    table: str | None = None
-
-    def __str__(self) -> str:
-        return f"({' '.join(filter(None, (self.instruction, self.gripper, self.box, self.table)))})"
-
-    @classmethod
-    def parse(cls, text: str) -> "Action":
-        """Read ``(grasp gripper box)`` or ``(place gripper box table)``.
-
-        Raises:
-            InputError: the text has another form.
-        """
-        match _words(text):
-            case ["grasp", gripper, box]:
-                return cls("grasp", gripper, box)
-            case ["place", gripper, box, table]:
-                return cls("place", gripper, box, table)
-        raise InputError(
-            f"action {text!r}", "is not an action", "(grasp gripper box), (place gripper box table)"
-        )
-
-
-@dataclass(frozen=True, order=True)
-class Goal:
-    """A goal g_j = (goal type, symbols) (paper, Sec. II-B)."""
-
-    kind: Literal["held", "on"]
-    box: str
-    table: str | None = None
-
-    def __str__(self) -> str:
-        return f"({' '.join(filter(None, (self.kind, self.box, self.table)))})"
-
-    @classmethod
-    def parse(cls, text: str) -> "Goal":
-        """Read ``(held box)`` or ``(on box table)``.
-
-        Raises:
-            InputError: the text has another form.
-        """
-        match _words(text):
-            case ["held", box]:
-                return cls("held", box)
-            case ["on", box, table]:
-                return cls("on", box, table)
-        raise InputError(f"goal {text!r}", "is not a goal", "(held box), (on box table)")
-
-
-Skeleton = tuple[Action, ...]
-"""A sequence of high-level actions a_1:K."""
-
-
-def format_skeleton(actions: Iterable[Action]) -> str:
-    """Write a skeleton as one line, readable by :func:`parse_skeleton`."""
-    return " ".join(map(str, actions))
-
-
-def parse_skeleton(text: str) -> Skeleton:
-    """Read a skeleton written by :func:`format_skeleton`.
-
-    Raises:
-        InputError: one of the actions, or what is between them, cannot be read.
-    """
-    return tuple(Action.parse(part) for part in re.findall(r"\([^()]*\)|[^()\s]+|[()]", text))
+    name: str
+    symbols: tuple[str, ...]
+    options: Mapping[str, str | float] = field(default_factory=dict, hash=False)
 
 
 @dataclass(frozen=True)
-class State:
-    """What holds what and what stands on what.
+class GroundInstruction:
+    """What an action is by its declaration, with symbols in place of variables."""
 
-    ``support`` maps every box that stands to what it stands on; ``held`` maps every box that is
-    held to its gripper. Both are sorted tuples of pairs, so that equal states compare equal.
-    """
-
-    support: tuple[tuple[str, str], ...]
-    held: tuple[tuple[str, str], ...] = ()
-
-    @classmethod
-    def of(cls, support: Mapping[str, str], held: Mapping[str, str] | None = None) -> "State":
-        """Build a state from dictionaries."""
-        return cls(tuple(sorted(support.items())), tuple(sorted((held or {}).items())))
-
-    def holder(self, box: str) -> str | None:
-        """The gripper that holds the box, if any."""
-        return next((gripper for held, gripper in self.held if held == box), None)
-
-    def held_by(self, gripper: str) -> str | None:
-        """The box that the gripper holds, if any."""
-        return next((box for box, holder in self.held if holder == gripper), None)
-
-    def support_of(self, box: str) -> str | None:
-        """What the box stands on; None while it is held."""
-        return next((table for standing, table in self.support if standing == box), None)
-
-    def standing_on(self, table: str) -> tuple[str, ...]:
-        """The boxes that stand directly on a table or box, sorted."""
-        return tuple(box for box, support in self.support if support == table)
-
-    def carried_by(self, table: str) -> tuple[str, ...]:
-        """The boxes that stand on a table or box directly or through others."""
-        direct = self.standing_on(table)
-        return direct + tuple(box for below in direct for box in self.carried_by(below))
-
-    def satisfies(self, goal: Goal) -> bool:
-        """Whether the goal holds in this state."""
-        if goal.kind == "held":
-            return self.holder(goal.box) is not None
-        return self.support_of(goal.box) == goal.table
+    action: Action
+    actor: str
+    """The acting gripper."""
+    body: str
+    """What changes its parent ..."""
+    parent: str
+    """... and what it hangs on afterwards."""
+    contact: tuple[GroundTerm, ...]
+    motion: tuple[GroundTerm, ...]
 
 
-def applicable_actions(state: State, symbols: Symbols) -> Iterator[Action]:
-    """The children of a node in their fixed order: grippers, then boxes or tables as declared."""
-    for gripper in symbols.grippers:
-        box = state.held_by(gripper)
-        if box is None:
-            for candidate in symbols.boxes:
-                if state.holder(candidate) is None:
-                    yield Action("grasp", gripper, candidate)
-        else:
-            barred = {box, *state.carried_by(box)}
-            for table in symbols.tables:
-                if table not in barred:
-                    yield Action("place", gripper, box, table)
+@dataclass(frozen=True)
+class Domain:
+    """Types, instructions and goal types; children and goals keep their order."""
+
+    name: str
+    types: tuple[Type, ...]
+    instructions: tuple[Instruction, ...]
+    goal_types: tuple[GoalType, ...]
+
+    def __hash__(self) -> int:
+        return hash(self.name)
+
+    def symbols(self, **names: Iterable[str]) -> Symbols:
+        """The symbols of a problem, by type: ``symbols(gripper=..., box=..., table=...)``.
+
+        Raises:
+            InputError: an unknown type, or a name given twice.
+        """
+        types = {declared.name: declared for declared in self.types}
+        for name in names:
+            if name not in types:
+                raise InputError("symbols", f"unknown type {name!r}", ", ".join(types))
+        own = {kind: tuple(members) for kind, members in names.items()}
+        every = [name for members in own.values() for name in members]
+        for name in every:
+            if every.count(name) > 1:
+                raise InputError("symbols", f"name {name!r} is used twice")
+        return Symbols(self, {wanted.name: self._members(wanted, own) for wanted in self.types})
+
+    def _members(self, wanted: Type, own: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
+        """The symbols of a type: first its own, then those that are of it, too."""
+        others = [declared for declared in self.types if declared != wanted]
+        kinds = [wanted, *(other for other in others if other.is_a(wanted))]
+        return tuple(name for kind in kinds for name in own.get(kind.name, ()))
+
+    def bind(self, action: Action) -> GroundInstruction:
+        """What the action is by its declaration.
+
+        Raises:
+            InputError: the domain has no such instruction, or it takes other symbols.
+        """
+        bound = self._bound.get(action)
+        if bound is None:
+            bound = self._bound[action] = self._bind(action)
+        return bound
+
+    @cached_property
+    def _bound(self) -> dict[Action, GroundInstruction]:
+        return {}
+
+    def _bind(self, action: Action) -> GroundInstruction:
+        self.check_action(action)
+        instruction = self.instruction(action.instruction)
+        assert instruction is not None
+        value = dict(zip(instruction.parameters, action.symbols, strict=True))
+        (effect,) = instruction.effect
+        return GroundInstruction(
+            action=action,
+            actor=action.symbols[0],
+            body=value[effect.body],
+            parent=value[effect.parent],
+            contact=tuple(_ground(term, value) for term in instruction.contact),
+            motion=tuple(_ground(step, value) for step in instruction.motion),
+        )
+
+    def instruction(self, name: str) -> Instruction | None:
+        """The instruction of a name."""
+        return next((known for known in self.instructions if known.name == name), None)
+
+    def goal_type(self, name: str) -> GoalType | None:
+        """The goal type of a name."""
+        return next((known for known in self.goal_types if known.name == name), None)
+
+    def check_action(self, action: Action) -> None:
+        """Check the name of an action and the number of its symbols.
+
+        Raises:
+            InputError: they fit none of the instructions.
+        """
+        known = self.instruction(action.instruction)
+        if known is None or len(known.parameters) != len(action.symbols):
+            accepted = signatures(self.instructions)
+            raise InputError(f"action {str(action)!r}", "is not an action", accepted)
+
+    def check_goal(self, goal: Goal) -> None:
+        """Check the name of a goal and the number of its symbols.
+
+        Raises:
+            InputError: they fit none of the goal types.
+        """
+        known = self.goal_type(goal.kind)
+        if known is None or len(known.parameters) != len(goal.symbols):
+            accepted = signatures(self.goal_types)
+            raise InputError(f"goal {str(goal)!r}", "is not a goal", accepted)
 
 
-def successor(state: State, action: Action) -> State:
-    """The state after an applicable action; what stands on the box moves with it."""
-    if action.instruction == "grasp":
-        support = tuple(pair for pair in state.support if pair[0] != action.box)
-        return State(support, tuple(sorted((*state.held, (action.box, action.gripper)))))
-    assert action.table is not None
-    support = tuple(sorted((*state.support, (action.box, action.table))))
-    return State(support, tuple(pair for pair in state.held if pair[0] != action.box))
+def signatures(declared: Iterable[Instruction | GoalType]) -> str:
+    """How actions or goals are written: ``(grasp gripper box), (place gripper box table)``."""
+    words = ((one.name, *(variable.name for variable in one.parameters)) for one in declared)
+    return ", ".join(f"({' '.join(names)})" for names in words)
 
 
-def progress(state: State, actions: Iterable[Action]) -> State:
-    """The state after a sequence of applicable actions."""
-    for action in actions:
-        state = successor(state, action)
-    return state
-
-
-def _words(text: str) -> list[str]:
-    stripped = text.strip()
-    if not (stripped.startswith("(") and stripped.endswith(")")):
-        return []
-    return stripped[1:-1].split()
+def _ground(term: Term, value: Mapping[Variable, str]) -> GroundTerm:
+    options = {
+        name: value[given] if isinstance(given, Variable) else given
+        for name, given in term.options.items()
+    }
+    return GroundTerm(term.name, tuple(value[v] for v in term.arguments), options)

@@ -4,7 +4,9 @@ from collections.abc import Iterable
 from itertools import combinations
 
 from guided_lgp.errors import InputError
-from guided_lgp.logic.domain import Goal, State
+from guided_lgp.logic.actions import Goal
+from guided_lgp.logic.domain import signatures
+from guided_lgp.logic.state import State
 from guided_lgp.logic.symbols import Symbols
 
 Objective = tuple[Goal, ...]
@@ -49,9 +51,12 @@ def parse_objective(goals: Iterable[str]) -> Objective:
 
 def all_goals(symbols: Symbols) -> list[Goal]:
     """Every goal over the symbols: held for each box, then on for each box and other table."""
-    held = [Goal("held", box) for box in symbols.boxes]
+    held = [Goal("held", (box,)) for box in symbols.boxes]
     on = [
-        Goal("on", box, table) for box in symbols.boxes for table in symbols.tables if table != box
+        Goal("on", (box, table))
+        for box in symbols.boxes
+        for table in symbols.tables
+        if table != box
     ]
     return held + on
 
@@ -93,8 +98,10 @@ def validate_objective(objective: Objective, symbols: Symbols, state: State) -> 
             left to do.
     """
     if not objective:
-        raise InputError("goal", "none given", "one or more of (held box), (on box table)")
+        accepted = signatures(symbols.domain.goal_types)
+        raise InputError("goal", "none given", f"one or more of {accepted}")
     for goal in objective:
+        symbols.domain.check_goal(goal)
         if goal.box not in symbols.boxes:
             raise InputError(f"goal {goal}", f"unknown box {goal.box!r}", ", ".join(symbols.boxes))
         if goal.kind == "on" and goal.table not in symbols.tables:

@@ -2,8 +2,9 @@
 
 from dataclasses import dataclass
 
-from guided_lgp.logic.domain import Action, Goal, State
+from guided_lgp.logic.actions import Action, Goal
 from guided_lgp.logic.objectives import Objective
+from guided_lgp.logic.state import State
 from guided_lgp.logic.symbols import Symbols
 
 Fact = tuple[str, ...]
@@ -33,14 +34,14 @@ def relaxed_operators(symbols: Symbols) -> list[RelaxedOperator]:
             holds = ("holds", gripper, box)
             operators.append(
                 RelaxedOperator(
-                    Action("grasp", gripper, box),
+                    Action("grasp", (gripper, box)),
                     frozenset({free, standing}),
                     frozenset({holds, held}),
                 )
             )
             operators.extend(
                 RelaxedOperator(
-                    Action("place", gripper, box, table),
+                    Action("place", (gripper, box, table)),
                     frozenset({holds}),
                     frozenset({("on", box, table), standing, free}),
                 )

@@ -1,22 +1,53 @@
 """The set of symbols L and their logic types (paper, Sec. II)."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from guided_lgp.logic.domain import Domain
 
 
 @dataclass(frozen=True)
 class Symbols:
-    """Symbols of a problem by logic type, in declaration order.
+    """Symbols of a problem by logic type, in declaration order; made by ``Domain.symbols``."""
 
-    Every box is also a table. ``box_is_table=False`` removes that second type: the reduced
-    branching that the paper grants the breadth-first planner (Table II, starred problems).
-    """
+    domain: "Domain"
+    members: Mapping[str, tuple[str, ...]] = field(hash=False)
+    """All symbols of each type: first its own, then those of other types that are of it, too."""
 
-    grippers: tuple[str, ...]
-    boxes: tuple[str, ...]
-    surfaces: tuple[str, ...]
-    box_is_table: bool = True
+    def of(self, kind: str) -> tuple[str, ...]:
+        """All symbols of a logic type."""
+        return self.members[kind]
+
+    def is_a(self, name: str, kind: str) -> bool:
+        """Whether a symbol is of a logic type."""
+        return name in self.members[kind]
+
+    def restricted(self, **members: tuple[str, ...]) -> "Symbols":
+        """The same with other symbols of some types, such as fewer tables.
+
+        This is the reduced branching that the paper grants the breadth-first planner (Table II,
+        starred problems).
+        """
+        return Symbols(self.domain, {**self.members, **members})
+
+    @property
+    def grippers(self) -> tuple[str, ...]:
+        """All symbols of logic type gripper."""
+        return self.members["gripper"]
+
+    @property
+    def boxes(self) -> tuple[str, ...]:
+        """All symbols of logic type box."""
+        return self.members["box"]
 
     @property
     def tables(self) -> tuple[str, ...]:
         """All symbols of logic type table: surfaces, then boxes."""
-        return self.surfaces + self.boxes if self.box_is_table else self.surfaces
+        return self.members["table"]
+
+    @property
+    def surfaces(self) -> tuple[str, ...]:
+        """The tables that stay where they are."""
+        return tuple(name for name in self.tables if name not in self.boxes)

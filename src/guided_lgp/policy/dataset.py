@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guided_lgp.documents import read_json, write_json, written_whole
+from guided_lgp.domains import load_domain
 from guided_lgp.errors import InputError
 from guided_lgp.logic import Objective, Symbols, parse_objective
 from guided_lgp.policy.encoding import CHAINS, INSTRUCTIONS, VERSION, Encoding, FloatArray
@@ -140,10 +141,10 @@ def load_dataset(directory: Path) -> Dataset:
     stored = document.get("encoding") if isinstance(document, dict) else None
     encoding = Encoding.parse(stored, str(path), _STAGE)
     try:
-        symbols = Symbols(
-            grippers=_names(document["grippers"]),
-            boxes=_names(document["boxes"]),
-            surfaces=_names(document["surfaces"]),
+        symbols = load_domain().symbols(
+            gripper=_names(document["grippers"]),
+            box=_names(document["boxes"]),
+            table=_names(document["surfaces"]),
         )
         objectives = tuple(parse_objective(_names(goals)) for goals in document["objectives"])
         configurations = _names(document["configurations"])

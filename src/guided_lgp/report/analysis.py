@@ -78,8 +78,7 @@ def novelty(symbols: Symbols, training: Iterable[Objective]) -> dict[str, str]:
 
 
 def _rename(goal: Goal, names: Mapping[str, str]) -> Goal:
-    table = goal.table and names.get(goal.table, goal.table)
-    return replace(goal, box=names[goal.box], table=table)
+    return replace(goal, symbols=tuple(names.get(name, name) for name in goal.symbols))
 
 
 def by_novelty(problems: pd.DataFrame, kinds: Mapping[str, str]) -> pd.DataFrame:

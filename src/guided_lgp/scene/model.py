@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from guided_lgp.documents import read_json
+from guided_lgp.domains import load_domain
 from guided_lgp.errors import InputError
 from guided_lgp.logic import State, Symbols
 
@@ -61,10 +62,10 @@ class Scene(_Document):
     @property
     def symbols(self) -> Symbols:
         """The symbols of the scene by logic type, as declared."""
-        return Symbols(
-            grippers=GRIPPERS,
-            boxes=tuple(box.name for box in self.boxes),
-            surfaces=tuple(table.name for table in self.tables),
+        return load_domain().symbols(
+            gripper=GRIPPERS,
+            box=(box.name for box in self.boxes),
+            table=(table.name for table in self.tables),
         )
 
     @property

@@ -14,13 +14,13 @@ import torch
 from safetensors.numpy import load_file, save_file
 
 from guided_lgp.bounds.results import Array
+from guided_lgp.domains import load_domain
 from guided_lgp.errors import InputError
 from guided_lgp.logic import (
     Action,
     Goal,
     Objective,
     State,
-    Symbols,
     applicable_actions,
     successor,
 )
@@ -44,10 +44,10 @@ class Problem(NamedTuple):
 def draw(boxes: int, tables: int, goals: int, seed: int) -> Problem:
     """A state after a few random actions, with random positions and goals."""
     rng = np.random.default_rng(seed)
-    symbols = Symbols(
-        tuple(GRIPPERS),
-        tuple(f"box{index}" for index in range(boxes)),
-        tuple(f"tab{index}" for index in range(tables)),
+    symbols = load_domain().symbols(
+        gripper=GRIPPERS,
+        box=[f"box{index}" for index in range(boxes)],
+        table=[f"tab{index}" for index in range(tables)],
     )
     state = State.of({box: str(rng.choice(symbols.surfaces)) for box in symbols.boxes})
     for _ in range(int(rng.integers(6))):
@@ -55,7 +55,7 @@ def draw(boxes: int, tables: int, goals: int, seed: int) -> Problem:
         state = successor(state, actions[rng.integers(len(actions))])
     kinds: list[Goal] = []
     for upper, lower in pairwise([*symbols.boxes[:goals], symbols.surfaces[0]]):
-        kinds.append(Goal("held", upper) if rng.random() < 0.2 else Goal("on", upper, lower))
+        kinds.append(Goal("held", (upper,)) if rng.random() < 0.2 else Goal("on", (upper, lower)))
     others = symbols.boxes + symbols.surfaces
     positions = {name: rng.uniform((0.3, -0.5, 0.6), (0.7, 0.5, 0.9)) for name in others}
     actions = list(applicable_actions(state, symbols))
@@ -71,16 +71,13 @@ def renamed(problem: Problem, names: dict[str, str]) -> Problem:
 
     positions = {new(name): position for name, position in problem.positions.items()}
     return Problem(
-        tuple(Goal(g.kind, new(g.box), g.table and new(g.table)) for g in problem.objective),
+        tuple(Goal(g.kind, tuple(map(new, g.symbols))) for g in problem.objective),
         State.of(
             {new(box): new(table) for box, table in problem.state.support},
             {new(box): new(gripper) for box, gripper in problem.state.held},
         ),
         {name: positions[name] for name in problem.positions},
-        [
-            Action(a.instruction, new(a.gripper), new(a.box), a.table and new(a.table))
-            for a in problem.actions
-        ],
+        [Action(a.instruction, tuple(map(new, a.symbols))) for a in problem.actions],
     )
 
 
@@ -151,8 +148,8 @@ def test_torch_and_numpy_agree_and_know_the_applicable_actions(
     network: RelationalNetwork, weights: Weights, seed: int
 ) -> None:
     problem = draw(boxes=4, tables=2, goals=3, seed=seed)
-    symbols = Symbols(
-        tuple(GRIPPERS), tuple(f"box{i}" for i in range(4)), tuple(f"tab{i}" for i in range(2))
+    symbols = load_domain().symbols(
+        gripper=GRIPPERS, box=[f"box{i}" for i in range(4)], table=[f"tab{i}" for i in range(2)]
     )
     one = situation(problem.objective, problem.state, problem.positions, symbols)
     inputs = graphs(one, LIMITS)

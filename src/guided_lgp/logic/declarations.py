@@ -1,0 +1,140 @@
+"""What a domain is declared with: types, atoms, terms, instructions and goal types.
+
+Declarations are data. Terms and steps are names with arguments; the layers above find their parts
+by these names.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class Type:
+    """A logic type: of symbols that are ``also`` of other types, and that may hang on ``parents``.
+
+    What has parents is movable: at any time it has exactly one, a symbol of one of these types.
+    Calling a type makes a variable of it.
+    """
+
+    name: str
+    also: tuple["Type", ...] = ()
+    parents: tuple["Type", ...] = ()
+
+    def __call__(self, name: str) -> "Variable":
+        """A variable of this type."""
+        return Variable(name, self)
+
+    def is_a(self, other: "Type") -> bool:
+        """Whether every symbol of this type is one of the other."""
+        return self == other or any(further.is_a(other) for further in self.also)
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A parameter of an instruction or goal type."""
+
+    name: str
+    type: Type
+
+
+@dataclass(frozen=True)
+class Atom:
+    """A statement about a state, or its negation: ``~held(b)``."""
+
+    predicate: str
+    arguments: tuple[Variable, ...]
+    negated: bool = False
+
+    def __invert__(self) -> "Atom":
+        return Atom(self.predicate, self.arguments, not self.negated)
+
+
+def holds(gripper: Variable, body: Variable) -> Atom:
+    """The gripper holds the body."""
+    return Atom("holds", (gripper, body))
+
+
+def held(body: Variable) -> Atom:
+    """Some gripper holds the body."""
+    return Atom("held", (body,))
+
+
+def free(gripper: Variable) -> Atom:
+    """The gripper holds nothing."""
+    return Atom("free", (gripper,))
+
+
+def on(body: Variable, support: Variable) -> Atom:
+    """The body stands directly on the support."""
+    return Atom("on", (body, support))
+
+
+def clear(support: Variable) -> Atom:
+    """Nothing stands on the support."""
+    return Atom("clear", (support,))
+
+
+def carries(body: Variable, other: Variable) -> Atom:
+    """The other is the body itself or stands on it, directly or through others."""
+    return Atom("carries", (body, other))
+
+
+def same(one: Variable, other: Variable) -> Atom:
+    """Both are one symbol."""
+    return Atom("same", (one, other))
+
+
+@dataclass(frozen=True)
+class Attach:
+    """The effect that the body hangs on another parent from now on; see :func:`attach`."""
+
+    body: Variable
+    parent: Variable
+
+
+def attach(body: Variable, parent: Variable) -> Attach:
+    """The body hangs on the parent from now on; what stands on the body moves with it."""
+    return Attach(body, parent)
+
+
+@dataclass(frozen=True)
+class Term:
+    """A constraint or a step of a motion, by name: ``line_in(g, back=0.09)``."""
+
+    name: str
+    arguments: tuple[Variable, ...]
+    options: Mapping[str, Variable | float | str] = field(default_factory=dict, hash=False)
+
+
+def terms(names: str) -> tuple[Callable[..., Term], ...]:
+    """Functions that make terms or steps of these names: ``hold, pads = terms("hold pads")``."""
+
+    def maker(name: str) -> Callable[..., Term]:
+        return lambda *arguments, **options: Term(name, arguments, options)
+
+    return tuple(map(maker, names.split()))
+
+
+@dataclass(frozen=True)
+class Instruction:
+    """A kind of action: what it needs, what it changes, and its geometry.
+
+    The first parameter is the acting gripper. ``contact`` are the terms that it adds at its contact
+    keyframe, ``motion`` the steps of its motion, both in order.
+    """
+
+    name: str
+    parameters: tuple[Variable, ...]
+    precondition: tuple[Atom, ...]
+    effect: tuple[Attach, ...]
+    contact: tuple[Term, ...] = ()
+    motion: tuple[Term, ...] = ()
+
+
+@dataclass(frozen=True)
+class GoalType:
+    """A kind of goal: what must be true of its parameters."""
+
+    name: str
+    parameters: tuple[Variable, ...]
+    condition: tuple[Atom, ...]
