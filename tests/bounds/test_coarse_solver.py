@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from guided_lgp import compiled
 from guided_lgp.bounds.coarse import compiler, solver
 from guided_lgp.bounds.coarse.formulation import Formulator, Margins, SceneGeometry
 from guided_lgp.bounds.coarse.kernels import Kernel, kernels
@@ -86,7 +87,7 @@ def test_of_two_processes_one_compiles_and_the_other_waits(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     assert compiler.load_library() is not None
-    library = next(compiler.cache_folder().glob("coarse-*.so"))
+    library = next(compiled.cache_folder().glob("coarse-*.so"))
     stand_in = tmp_path / "bin" / "cc"
     stand_in.parent.mkdir()
     stand_in.write_text(COMPILER.format(log=tmp_path / "log", library=library))
@@ -117,7 +118,7 @@ def test_without_a_compiler_the_interpreter_takes_over_and_says_so_once(
 ) -> None:
     description = pr2.urdf_path()
     monkeypatch.setattr(pr2, "urdf_path", lambda: description)
-    monkeypatch.setattr(compiler, "find_spec", lambda name: None)
+    monkeypatch.setattr(compiled, "find_spec", lambda name: None)
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     solver.default_solver.cache_clear()

@@ -7,6 +7,7 @@ joint values move a frame from the origin to a pose if they have it. Screws are 
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from enum import IntFlag
 from itertools import pairwise
 
 import numpy as np
@@ -20,40 +21,64 @@ _Reach = Callable[[Array, Array, Array, Array], Array]
 """Three axes and points, a point and where it has to go, to angles (..., 4, 3)."""
 
 
+BRANCHES = 8
+"""Solutions of every structure, some of which may coincide or be out of reach."""
+
+
+class Kind(IntFlag):
+    """What a structure is made of; the numbers are those of inverse.c."""
+
+    WRIST = 0
+    """The last three axes meet."""
+    BACKWARDS = 1
+    """The first three do: the arm is read from its tool to its root."""
+    REACH_PARALLEL = 2
+    """The first two of the other three joints are parallel; otherwise they meet."""
+    REACH_BACKWARDS = 4
+    """The last two of them are meant."""
+    PARALLEL = 8
+    """The second to fourth axes are parallel, and the last two meet."""
+
+
 @dataclass(frozen=True)
 class Structure:
     """A way to solve six joints."""
 
     misfit: float
     """How far (m, or sine of an angle) the arm is from having the structure."""
-    guess: Guess
+    kind: Kind
+
+    @property
+    def guess(self) -> Guess:
+        """Solves for poses as if the misfit were zero."""
+        if self.kind & Kind.PARALLEL:
+            return _parallel
+        reach = _reach_parallel if self.kind & Kind.REACH_PARALLEL else _reach_crossing
+        wrist = _wrist(_reach_backwards(reach) if self.kind & Kind.REACH_BACKWARDS else reach)
+        return _backwards(wrist) if self.kind & Kind.BACKWARDS else wrist
 
 
 def closest(axes: Array, points: Array) -> Structure:
     """The structure that six screws (6, 3) have, or nearly have."""
-    back = _reversed(axes, points)
-    wrists = [
-        Structure(misfit + _apart(axes[3:], points[3:]), _wrist(reach))
-        for misfit, reach in _reaches(axes[:3], points[:3])
+    parallel = _skew(axes[1], axes[2]) + _skew(axes[1], axes[3]) + _apart(axes[4:], points[4:])
+    structures = [
+        *_wrists(axes, points, Kind.WRIST),
+        *_wrists(*_reversed(axes, points), Kind.BACKWARDS),
+        Structure(parallel, Kind.PARALLEL),
     ]
-    shoulders = [
-        Structure(misfit + _apart(axes[:3], points[:3]), _backwards(_wrist(reach)))
-        for misfit, reach in _reaches(back[0][:3], back[1][:3])
-    ]
-    parallel = Structure(
-        _skew(axes[1], axes[2]) + _skew(axes[1], axes[3]) + _apart(axes[4:], points[4:]), _parallel
-    )
-    return min((*wrists, *shoulders, parallel), key=lambda structure: structure.misfit)
+    return min(structures, key=lambda structure: structure.misfit)
 
 
-def _reaches(axes: Array, points: Array) -> list[tuple[float, _Reach]]:
-    """Misfits and solutions of three joints that move a point."""
-    return [
-        (_apart(axes[:2], points[:2]), _reach_crossing),
-        (_skew(axes[0], axes[1]), _reach_parallel),
-        (_apart(axes[1:], points[1:]), _reach_backwards(_reach_crossing)),
-        (_skew(axes[1], axes[2]), _reach_backwards(_reach_parallel)),
-    ]
+def _wrists(axes: Array, points: Array, kind: Kind) -> list[Structure]:
+    """Three axes that meet, after three joints of one kind or another."""
+    wrist = _apart(axes[3:], points[3:])
+    reaches = {
+        kind: _apart(axes[:2], points[:2]),
+        kind | Kind.REACH_PARALLEL: _skew(axes[0], axes[1]),
+        kind | Kind.REACH_BACKWARDS: _apart(axes[1:3], points[1:3]),
+        kind | Kind.REACH_PARALLEL | Kind.REACH_BACKWARDS: _skew(axes[1], axes[2]),
+    }
+    return [Structure(wrist + misfit, kind) for kind, misfit in reaches.items()]
 
 
 def _skew(first: Array, second: Array) -> float:
