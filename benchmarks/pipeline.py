@@ -23,7 +23,7 @@ from guided_lgp.experiments import compare_scalability, enumerate_sequences
 from guided_lgp.experiments.problems import PROBLEMS
 from guided_lgp.params import load_params
 from guided_lgp.paths import PARAMS, SCENES, TRAINED
-from guided_lgp.policy.training import fit
+from guided_lgp.policy.paper.training import fit
 from guided_lgp.scene import generate, load_scenes
 
 ROOT = Path(__file__).parents[1]

@@ -21,7 +21,7 @@ from guided_lgp.experiments import enumerate_sequences
 from guided_lgp.logic import Objective, two_goal_objectives
 from guided_lgp.params import load_params
 from guided_lgp.paths import METRICS, PARAMS
-from guided_lgp.policy.samples import build_dataset
+from guided_lgp.policy.paper.samples import build_dataset
 from guided_lgp.report.table import Table
 from guided_lgp.report.tables import number
 from guided_lgp.scene import Scene, generate

@@ -14,18 +14,17 @@ def run(words: list[str]) -> None:
         InputError: the words name no stage, or the stage's input is bad.
     """
     end_with_dvc()
-    from guided_lgp.experiments import feasibility, studies
-    from guided_lgp.report.studies import render
+    from guided_lgp.studies import evaluate, feasibility, tables, train
 
     match words:
         case ["train", case]:
-            studies.train(Path.cwd(), case)
+            train.train(Path.cwd(), case)
         case ["evaluate", table]:
-            studies.evaluate(Path.cwd(), table)
+            evaluate.evaluate(Path.cwd(), table)
         case ["feasibility"]:
             feasibility.run(Path.cwd())
         case ["render"]:
-            render(Path.cwd())
+            tables.render(Path.cwd())
         case _:
             stages = "train CASE, evaluate TABLE, feasibility, render"
             raise InputError("stage", f"unknown: {' '.join(words)}", stages)

@@ -234,7 +234,7 @@ def test_errors_of_the_studies_are_one_line_too(
     def fail(root: Path, case: str) -> None:
         raise error
 
-    monkeypatch.setattr("guided_lgp.experiments.studies.train", fail)
+    monkeypatch.setattr("guided_lgp.studies.train.train", fail)
     monkeypatch.setattr("sys.argv", ["run.py", "train", "x"])
     before = signal.getsignal(signal.SIGTERM)
     try:

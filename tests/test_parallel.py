@@ -98,8 +98,8 @@ end_with_dvc()
 """
 STUDY = """
 import runpy, sys
-from guided_lgp.experiments import studies
-studies.train = lambda root, case: exec({fan_out!r}, {{}})
+from guided_lgp.studies import train
+train.train = lambda root, case: exec({fan_out!r}, {{}})
 sys.argv[1:] = ["train", "paper"]
 runpy.run_path({script!r}, run_name="__main__")
 """

@@ -12,7 +12,7 @@ from guided_lgp.errors import InputError
 from guided_lgp.explanation import ObservedBounds, Obstacle
 from guided_lgp.logic import Action, Skeleton, State, parse_objective, parse_skeleton
 from guided_lgp.planning import PlanningResult
-from guided_lgp.policy.inference import POLICIES
+from guided_lgp.policy.registry import POLICIES
 from guided_lgp.search.result import Times
 
 ROOT = Path(__file__).parents[1]
@@ -156,7 +156,7 @@ def test_unknown_names() -> None:
 
 
 def test_the_command_line_has_the_defaults_of_the_python_interface() -> None:
-    assert tuple(cli.Policy) == POLICIES
+    assert tuple(cli.Policy) == tuple(POLICIES)
     command, function = inspect.signature(cli.plan), inspect.signature(plan)
     for name in ("planner", "policy"):
         assert command.parameters[name].default == function.parameters[name].default

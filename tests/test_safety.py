@@ -20,7 +20,7 @@ import pytest
 from guided_lgp import cli, parallel, tracking
 from guided_lgp.bounds.results import Trajectory
 from guided_lgp.errors import InputError
-from guided_lgp.policy.dataset import load_dataset
+from guided_lgp.policy.paper.dataset import load_dataset
 from guided_lgp.scene import Scene, load_scene, pr2
 from guided_lgp.view.replay import replay_html
 from guided_lgp.view.viewer import Viewer
@@ -130,7 +130,7 @@ from pathlib import Path
 from guided_lgp import planning
 from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.params import load_params
-from guided_lgp.policy.inference import load_policy
+from guided_lgp.policy.paper.inference import load_policy
 from guided_lgp.scene import load_scene
 
 scene, params = load_scene(Path("examples/three_boxes.json")), load_params()

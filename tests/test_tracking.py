@@ -17,8 +17,8 @@ from guided_lgp import tracking
 from guided_lgp.errors import InputError
 from guided_lgp.mlflow_model import log_model
 from guided_lgp.params import Params, load_params
-from guided_lgp.policy.encoding import CHAINS, Encoding
-from guided_lgp.policy.models import Model
+from guided_lgp.policy.paper.encoding import CHAINS, Encoding
+from guided_lgp.policy.paper.model import Model
 from guided_lgp.policy.relational import model as relational
 from guided_lgp.policy.relational.encoding import Range
 from guided_lgp.policy.relational.model import Weights, shapes

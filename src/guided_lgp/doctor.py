@@ -13,14 +13,9 @@ from tempfile import TemporaryFile
 
 from guided_lgp.errors import InputError
 from guided_lgp.paths import DESCRIPTIONS, MODELS, SOURCES
+from guided_lgp.policy.registry import POLICIES, load_policy
 
 _INSTALL = f"pip install -r {SOURCES / 'requirements.lock'}"
-_POLICIES = {
-    "paper": "train_policy",
-    "improved": "train_improved",
-    "relational": "train_relational",
-}
-"""The trained policies and the stages that train them."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +32,7 @@ class Finding:
 def examine() -> list[Finding]:
     """Run every check, in an order in which each one makes sense."""
     checks: list[Callable[[], Finding]] = [_python, _packages, _robot, _compiler, _cache]
-    checks += [partial(_policy, name) for name in _POLICIES]
+    checks += [partial(_policy, name) for name in POLICIES]
     return [check() for check in [*checks, _pipeline]]
 
 
@@ -98,9 +93,7 @@ def _cache() -> Finding:
 def _policy(name: str) -> Finding:
     title = f"Policy {name}"
     try:
-        from guided_lgp.policy.inference import load_policy
-
-        load_policy(MODELS, name)
+        load_policy(name)
     except ImportError as error:
         return Finding(title, False, str(error), _INSTALL)
     except InputError as error:
@@ -108,7 +101,7 @@ def _policy(name: str) -> Finding:
             title,
             False,
             str(error),
-            f"git checkout src, or: dvc repro {_POLICIES[name]}; make ship",
+            f"git checkout src, or: dvc repro {POLICIES[name]}; make ship",
         )
     return Finding(title, True, f"trained, in {MODELS}")
 

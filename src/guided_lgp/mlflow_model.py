@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from guided_lgp.logic import applicable_actions, parse_objective
-from guided_lgp.policy.encoding import FloatArray
-from guided_lgp.policy.inference import chain_log_probabilities
-from guided_lgp.policy.models import Model, load_model
+from guided_lgp.policy.arrays import FloatArray
+from guided_lgp.policy.paper.inference import chain_log_probabilities
+from guided_lgp.policy.paper.model import Model, load_model
 from guided_lgp.policy.relational.inference import RelationalPolicy, load_relational
 from guided_lgp.scene import Scene
 from guided_lgp.scene.model import Box, Table, parse_scene

@@ -67,7 +67,7 @@ class EnumerateSequences(Section):
     slack: Annotated[int, Field(strict=True, ge=0, le=4)]
 
 
-class Variant(Section):
+class SampleRecipe(Section):
     """How samples are made and encoded; the defaults are the paper's."""
 
     adapted_goals: Flag = False
@@ -85,7 +85,7 @@ class Variant(Section):
     surface."""
     normalised: Flag = False
     """Shift and scale every coordinate to mean 0 and deviation 1 over the training states."""
-    meaning: Flag = False
+    symbolic_state: Flag = False
     """Add what the state means to the input: what each box stands on or is held by, and whether
     each encoded goal holds."""
     chain: Flag = True
@@ -97,8 +97,8 @@ class BuildDataset(Section):
 
     training_objectives: Annotated[int, Field(strict=True, ge=1, le=72)]
     seed: Seed
-    improved: Variant
-    """What the improved variant of the paper's networks is trained on."""
+    improved: SampleRecipe
+    """What the improved networks are trained on."""
 
 
 class Network(Section):

@@ -11,7 +11,7 @@ from guided_lgp.explanation import ObservedBounds, Obstacle
 from guided_lgp.logic import Goal, parse_objective, validate_objective
 from guided_lgp.params import PlanningParams, load_planning
 from guided_lgp.paths import MODELS
-from guided_lgp.policy.inference import load_policy
+from guided_lgp.policy.registry import load_policy
 from guided_lgp.scene import Scene
 from guided_lgp.scene.validate import validate_scene
 from guided_lgp.search import best_first, breadth_first, guided
@@ -101,7 +101,7 @@ def plan(
         result = breadth_first.plan(scene, goals, scene.symbols, bounds, limits)
     else:
         search = guided.plan if planner == "guided" else best_first.plan
-        networks = load_policy(models, policy)
+        networks = load_policy(policy, models)
         result = search(scene, goals, scene.symbols, bounds, networks, limits)
     return PlanningResult(
         **vars(result),

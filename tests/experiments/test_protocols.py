@@ -6,12 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from guided_lgp.bounds.results import Array, CoarseResult, Failure, PathResult
+from guided_lgp.bounds.results import Array
 from guided_lgp.experiments import compare_scalability, evaluate_generalization
 from guided_lgp.logic import (
     Action,
     Objective,
-    Skeleton,
     State,
     format_objective,
     one_goal_objectives,
@@ -20,29 +19,10 @@ from guided_lgp.logic import (
     satisfied,
     two_goal_objectives,
 )
-from guided_lgp.params import BoundsParams, Params, load_params
-from guided_lgp.scene import Scene, generate
+from guided_lgp.params import Params, load_params
+from guided_lgp.scene import generate
 from guided_lgp.search.enumerate import enumerate_sequences
-from guided_lgp.search.observation import start
-
-FAILURE = Failure(0, "reach", 0.1, "scripted")
-
-
-class NothingOnBlue:
-    """Bounds under which nothing can stand on blue, and nothing on green has a path."""
-
-    def __init__(self, scene: Scene, params: BoundsParams) -> None:
-        self._keyframe = start(scene)
-
-    def coarse(self, skeleton: Skeleton) -> CoarseResult:
-        if any(action.table == "blue" for action in skeleton):
-            return CoarseResult(skeleton, False, failure=FAILURE, time_s=0.5)
-        frames = (self._keyframe,) * len(skeleton)
-        return CoarseResult(skeleton, True, frames, frames, time_s=0.5)
-
-    def path(self, skeleton: Skeleton) -> PathResult:
-        feasible = all(action.table != "green" for action in skeleton)
-        return PathResult(skeleton, feasible, failure=None if feasible else FAILURE, time_s=2.0)
+from stand_ins import NothingOnBlue
 
 
 class Sensible:
@@ -71,7 +51,7 @@ class Sensible:
 def params(monkeypatch: pytest.MonkeyPatch) -> Params:
     for module in (compare_scalability, evaluate_generalization):
         monkeypatch.setattr(module, "SceneBounds", NothingOnBlue)
-        monkeypatch.setattr(module, "load_policy", lambda directory, name: Sensible())
+        monkeypatch.setattr(module, "load_policy", lambda name, directory: Sensible())
     return load_params(Path(__file__).parents[2] / "params.yaml")
 
 

@@ -31,11 +31,11 @@ from guided_lgp.domains import load_domain
 from guided_lgp.experiments.enumerate_sequences import SHORTEST, VERDICTS
 from guided_lgp.experiments.files import read_table, write_table
 from guided_lgp.logic import two_goal_objectives
-from guided_lgp.policy.dataset import Dataset, load_dataset
-from guided_lgp.policy.encoding import CHAINS, Encoding
-from guided_lgp.policy.inference import load_policy
-from guided_lgp.policy.models import Model, load_model
-from guided_lgp.policy.samples import build_dataset
+from guided_lgp.policy.paper.dataset import Dataset, load_dataset
+from guided_lgp.policy.paper.encoding import CHAINS, Encoding
+from guided_lgp.policy.paper.inference import load_networks
+from guided_lgp.policy.paper.model import Model, load_model
+from guided_lgp.policy.paper.samples import build_dataset
 from guided_lgp.report.inputs import read_object
 from guided_lgp.scene import GeneratedScenes, generate, load_scene, load_scenes
 from guided_lgp.scene.setups import SETUPS
@@ -345,7 +345,7 @@ def test_truncated_weights(network: str, data: st.DataObject, models: Path, fold
     target = copy_files(models, folder / "models-3")
     file = target / f"{network}.safetensors"
     file.write_bytes(data.draw(truncated(file.read_bytes())))
-    assert answer(lambda: load_policy(target), file) is None
+    assert answer(lambda: load_networks(target, "train_policy"), file) is None
 
 
 @examples(60)
@@ -457,4 +457,4 @@ def test_the_undamaged_files_are_read(
     assert len(load_dataset(dataset)) == 30
     for network in CHAINS:
         check_model(load_model(models, network), network)
-    assert load_policy(models).encoding == Encoding()
+    assert load_networks(models, "train_policy").encoding == Encoding()

@@ -12,11 +12,11 @@ from bad_input import answer, examples, garbled, odd_values, spoilt
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from guided_lgp.params import Params, Variant, load_params
+from guided_lgp.params import Params, SampleRecipe, load_params
 
 FILE = Path(__file__).parents[2] / "params.yaml"
 DOCUMENT: dict[str, Any] = yaml.safe_load(FILE.read_text(encoding="utf-8"))
-PAPER = Variant().model_dump()
+PAPER = SampleRecipe().model_dump()
 
 
 def leaves(values: Mapping[str, Any], prefix: tuple[str, ...] = ()) -> Iterator[tuple[Any, ...]]:
@@ -42,7 +42,7 @@ def read(path: Path, text: str | bytes) -> Params | None:
 def check(params: Params, document: Any) -> None:
     """Nothing is left out, made up or converted, except numbers written as text: ``1e-3``.
 
-    What a variant does not name is the paper's.
+    What a recipe does not name is the paper's.
     """
     accepted = {tuple(keys): value for *keys, value in leaves(params.model_dump())}
     given = {("build_dataset", "improved", *keys): value for *keys, value in leaves(PAPER)}

@@ -20,7 +20,7 @@ from guided_lgp.logic import (
     two_goal_objectives,
 )
 from guided_lgp.paths import EVALUATION, METRICS, SCENES, SEQUENCES, TRAINING
-from guided_lgp.policy.encoding import CHAINS
+from guided_lgp.policy.paper.encoding import CHAINS
 from guided_lgp.scene import Scene, generate
 from guided_lgp.scene.pr2 import ARM_JOINTS, HOME_CONFIGURATION
 

@@ -3,9 +3,9 @@
 import logging
 from pathlib import Path
 
-from guided_lgp.params import Params, Variant
+from guided_lgp.params import Params, SampleRecipe
 from guided_lgp.paths import DATASET, SCENES, SEQUENCES
-from guided_lgp.policy.samples import build_dataset
+from guided_lgp.policy.paper.samples import build_dataset
 from guided_lgp.policy.split import training_objectives
 from guided_lgp.scene import load_scenes
 
@@ -17,14 +17,14 @@ def run(params: Params, root: Path) -> None:
     settings = params.build_dataset
     scenes = load_scenes(root / SCENES / "training.json").scenes
     objectives = training_objectives(scenes[0].symbols, settings.training_objectives, settings.seed)
-    for policy, variant in {"paper": Variant(), "improved": settings.improved}.items():
+    for policy, recipe in {"paper": SampleRecipe(), "improved": settings.improved}.items():
         dataset = build_dataset(
             scenes,
             root / SEQUENCES / "training.parquet",
             root / SEQUENCES / "training_shortest.parquet",
             objectives,
             params.enumerate_sequences.slack,
-            variant,
+            recipe,
             settings.seed,
         )
         dataset.save(root / DATASET / policy)

@@ -25,7 +25,7 @@ from guided_lgp.experiments.problems import PROBLEMS, Problem
 from guided_lgp.logic import Objective, format_objective, format_skeleton
 from guided_lgp.params import BoundsParams, Params, SearchLimits
 from guided_lgp.paths import EVALUATION, METRICS, SCENES, TRAINED
-from guided_lgp.policy.inference import POLICIES, load_policy
+from guided_lgp.policy.registry import POLICIES, load_policy
 from guided_lgp.scene import Scene, load_scenes
 from guided_lgp.search import best_first, breadth_first, classical, graph, guided
 from guided_lgp.search.bounds import Bounds
@@ -139,7 +139,7 @@ def _planners(
     """Every planner, by name, as a function of the objective alone."""
     symbols = task.scene.symbols
     unguided_symbols = problem.unguided_symbols(symbols)
-    policies: dict[str, Policy] = {name: load_policy(task.models, name) for name in POLICIES}
+    policies: dict[str, Policy] = {name: load_policy(name, task.models) for name in POLICIES}
     policies["uniform"] = Uniform()
     depth = max(task.limits.max_depth, 2 * problem.k_min)
     limits = task.limits.model_copy(update={"max_depth": depth})

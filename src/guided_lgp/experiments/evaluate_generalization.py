@@ -32,7 +32,7 @@ from guided_lgp.logic import (
 )
 from guided_lgp.params import BoundsParams, Params, SearchLimits
 from guided_lgp.paths import EVALUATION, METRICS, SCENES, SEQUENCES, TRAINED
-from guided_lgp.policy.inference import POLICIES, load_policy
+from guided_lgp.policy.registry import POLICIES, load_policy
 from guided_lgp.policy.split import training_objectives
 from guided_lgp.scene import Scene, load_scenes
 from guided_lgp.search import best_first, guided
@@ -148,7 +148,7 @@ def evaluate(task: Task) -> list[Row]:
     """Rows of one configuration: every objective by every planner."""
     symbols = task.scene.symbols
     bounds = SceneBounds(task.scene, task.bounds)
-    policies: dict[str, Policy] = {name: load_policy(task.models, name) for name in POLICIES}
+    policies: dict[str, Policy] = {name: load_policy(name, task.models) for name in POLICIES}
     policies["uniform"] = Uniform()
     known = [parse_skeleton(text) for text in task.sequences]
     return [

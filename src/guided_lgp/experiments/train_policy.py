@@ -4,8 +4,8 @@ from pathlib import Path
 
 from guided_lgp.params import Params
 from guided_lgp.paths import DATASET, TRAINED, TRAINING
-from guided_lgp.policy.dataset import load_dataset
-from guided_lgp.policy.train import train_network
+from guided_lgp.policy.paper.dataset import load_dataset
+from guided_lgp.policy.paper.train import train_network
 
 
 def run(params: Params, root: Path, network: str) -> None:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from guided_lgp.params import Params
 from guided_lgp.paths import DATASET, TRAINED, TRAINING
-from guided_lgp.policy.dataset import load_dataset
+from guided_lgp.policy.paper.dataset import load_dataset
 from guided_lgp.policy.relational.train import train_relational
 
 

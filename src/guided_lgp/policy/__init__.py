@@ -1,1 +1,1 @@
-"""The hierarchical policy: encoding, data set, networks, training and inference."""
+"""Policies: what is declared about each, their encodings, samples, training and inference."""

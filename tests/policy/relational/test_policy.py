@@ -24,7 +24,7 @@ from guided_lgp.logic import (
     applicable_actions,
     successor,
 )
-from guided_lgp.policy.inference import load_policy
+from guided_lgp.policy.registry import load_policy
 from guided_lgp.policy.relational.encoding import Range, applicable, graphs, situation
 from guided_lgp.policy.relational.inference import RelationalPolicy, load_relational
 from guided_lgp.policy.relational.model import Model, Weights, shapes
@@ -182,7 +182,7 @@ def test_what_lies_outside_the_range_of_training_looks_like_its_border(
 
 def test_files_are_read_back_without_torch(models: Path, policy: RelationalPolicy) -> None:
     problem = draw(boxes=3, tables=2, goals=2, seed=2)
-    scores = load_policy(models, "relational").log_probabilities(*problem)
+    scores = load_policy("relational", models).log_probabilities(*problem)
     np.testing.assert_array_equal(scores, policy.log_probabilities(*problem))
     script = (
         "import sys, pathlib; from guided_lgp.policy.relational.inference import load_relational;"

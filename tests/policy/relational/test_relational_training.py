@@ -9,12 +9,12 @@ from synthetic import Enumeration
 
 from guided_lgp.errors import InputError
 from guided_lgp.params import Parallel, TrainRelational
-from guided_lgp.policy.dataset import Dataset
+from guided_lgp.policy.paper.dataset import Dataset
+from guided_lgp.policy.paper.samples import build_dataset
 from guided_lgp.policy.relational.encoding import NO_GOAL, Range, applicable, graphs
 from guided_lgp.policy.relational.samples import Examples, examples, own_side, supports_first
 from guided_lgp.policy.relational.train import train_relational
 from guided_lgp.policy.relational.training import fit
-from guided_lgp.policy.samples import build_dataset
 from guided_lgp.policy.split import training_objectives
 
 SETTINGS = TrainRelational(
@@ -121,6 +121,6 @@ def test_faults_are_one_line(dataset: Dataset, tmp_path: Path) -> None:
         train_relational(dataset, settings, parallel, tmp_path)
     with pytest.raises(InputError, match="the loss is not finite"):
         train_relational(dataset, SETTINGS.model_copy(update={"lr": 1e30}), parallel, tmp_path)
-    variant = replace(dataset, encoding=replace(dataset.encoding, relative=True))
-    with pytest.raises(InputError, match="is encoded as a variant"):
-        examples(variant)
+    other = replace(dataset, encoding=replace(dataset.encoding, relative=True))
+    with pytest.raises(InputError, match="is encoded otherwise"):
+        examples(other)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guided_lgp.logic import Objective, State, Symbols
-from guided_lgp.policy.encoding import FloatArray
+from guided_lgp.policy.arrays import BoolArray, FloatArray, IntArray
 
 NO_GOAL = -1
 GOAL_HELD = -2
@@ -56,9 +56,6 @@ EDGE_FEATURES = (
 
 SIDES = (1.0, -1.0)
 """Sign of y on each gripper's own side: the grippers are declared left, then right."""
-
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)

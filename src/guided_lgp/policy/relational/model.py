@@ -11,7 +11,7 @@ from safetensors.numpy import load_file, save
 
 from guided_lgp.documents import read_json, write_json, written_whole
 from guided_lgp.errors import InputError
-from guided_lgp.policy.encoding import FloatArray
+from guided_lgp.policy.arrays import FloatArray
 from guided_lgp.policy.relational.encoding import EDGE_FEATURES, NODE_FEATURES, Graphs, Range
 
 VERSION = 1

@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guided_lgp.errors import InputError
-from guided_lgp.policy.dataset import Dataset
-from guided_lgp.policy.encoding import GOAL_KINDS, Encoding
+from guided_lgp.policy.arrays import BoolArray, IntArray
+from guided_lgp.policy.paper.dataset import Dataset
+from guided_lgp.policy.paper.encoding import GOAL_KINDS, Encoding
 from guided_lgp.policy.relational.encoding import (
     CARRIES,
     ELSEWHERE,
@@ -17,8 +18,6 @@ from guided_lgp.policy.relational.encoding import (
     READY,
     SETTLED,
     SIDES,
-    BoolArray,
-    IntArray,
     Range,
     Situations,
     graphs,
@@ -57,9 +56,7 @@ def examples(dataset: Dataset) -> Examples:
     """
     encoding = dataset.encoding
     if encoding != Encoding():
-        raise InputError(
-            "data set", "is encoded as a variant", "the samples of the paper's networks"
-        )
+        raise InputError("data set", "is encoded otherwise", "the samples of the paper's networks")
     supports = dataset.supports[dataset.sample_state].astype(np.int64)
     goals = _goals(dataset)[dataset.sample_goals]
     kept = np.where((goals == supports) | ((goals == GOAL_HELD) & (supports < 0)), NO_GOAL, goals)

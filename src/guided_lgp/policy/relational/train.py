@@ -1,32 +1,41 @@
 """Trains the relational policy from the samples of the paper's networks."""
 
-import logging
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from guided_lgp.errors import InputError
-from guided_lgp.parallel import run
 from guided_lgp.params import Parallel, TrainRelational
-from guided_lgp.policy.dataset import Dataset
-from guided_lgp.policy.encoding import INSTRUCTIONS
-from guided_lgp.policy.relational.encoding import BoolArray
+from guided_lgp.policy import splits
+from guided_lgp.policy.arrays import BoolArray
+from guided_lgp.policy.paper.dataset import Dataset
+from guided_lgp.policy.paper.encoding import INSTRUCTIONS
 from guided_lgp.policy.relational.model import NAME, Model
 from guided_lgp.policy.relational.samples import Examples, examples
 from guided_lgp.policy.relational.training import Fit, fit
-from guided_lgp.policy.train import SPLITS, TrainingReport, held_out_samples
+from guided_lgp.policy.splits import SPLITS, TrainingReport
 
-logger = logging.getLogger(__name__)
+ACTION = "action"
+"""The one sub-policy: the whole action."""
 
 
 @dataclass(frozen=True)
-class _Task:
+class _Training:
     split: str
     problems: Examples
     validation: BoolArray
     """(N,) the problems for validation."""
     settings: TrainRelational
+    network: str = NAME
+    sub_policy: str = ACTION
+
+    def fit(self) -> Fit:
+        return fit(
+            self.problems[~self.validation],
+            self.problems[self.validation],
+            self.settings,
+            np.random.SeedSequence([self.settings.seed, len(SPLITS)]),
+        )
 
 
 def train_relational(
@@ -50,21 +59,11 @@ def train_relational(
         InputError: too few problems to split, or a training that diverges at once.
     """
     problems = examples(dataset)
-    tasks = [_task(problems, split, settings) for split in SPLITS]
-    fits = dict(zip(SPLITS, run(_train, tasks, parallel, "training relational"), strict=True))
-    _model(tasks[0], fits["random"]).save(directory)
-    return TrainingReport(
-        network=NAME,
-        seed=settings.seed,
-        samples=len(problems),
-        sub_policies={
-            "action": {
-                "classes": INSTRUCTIONS,
-                **fits["random"].figures(),
-                "by_configuration": fits["configuration"].figures(),
-            }
-        },
-    )
+    trainings = [_training(problems, split, settings) for split in SPLITS]
+    fits = splits.fit_all(trainings, parallel, NAME)
+    _model(trainings[0], fits["random"][ACTION]).save(directory)
+    classes = {ACTION: INSTRUCTIONS}
+    return TrainingReport.of(NAME, settings.seed, len(problems), classes, fits)
 
 
 def train_split(dataset: Dataset, settings: TrainRelational, split: str) -> Model:
@@ -73,35 +72,16 @@ def train_split(dataset: Dataset, settings: TrainRelational, split: str) -> Mode
     Raises:
         InputError: too few problems to split, or a training that diverges at once.
     """
-    task = _task(examples(dataset), split, settings)
-    return _model(task, _train(task))
+    training = _training(examples(dataset), split, settings)
+    return _model(training, splits.fit(training))
 
 
-def _task(problems: Examples, split: str, settings: TrainRelational) -> _Task:
-    task = _Task(
-        split, problems, held_out_samples(problems.configuration, split, settings), settings
-    )
-    held_out = np.count_nonzero(task.validation)
-    if not 0 < held_out < len(problems):
-        raise InputError(
-            "train_relational.validation_share",
-            f"{held_out} of {len(problems)} problems for validation (split: {split})",
-            "a share that leaves problems on both sides; or more configurations",
-        )
-    return task
+def _training(problems: Examples, split: str, settings: TrainRelational) -> _Training:
+    validation = splits.held_out_samples(problems.configuration, split, settings)
+    splits.require_both_sides(validation, "train_relational", "problems", split)
+    return _Training(split, problems, validation, settings)
 
 
-def _model(task: _Task, result: Fit) -> Model:
-    training = {"samples": len(task.problems), **task.settings.model_dump()}
-    return Model(result.weights, training)
-
-
-def _train(task: _Task) -> Fit:
-    result = fit(
-        task.problems[~task.validation],
-        task.problems[task.validation],
-        task.settings,
-        np.random.SeedSequence([task.settings.seed, len(SPLITS)]),
-    )
-    logger.info("%s.%s: %s", NAME, task.split, result)
-    return result
+def _model(training: _Training, result: Fit) -> Model:
+    settings = {"samples": len(training.problems), **training.settings.model_dump()}
+    return Model(result.weights, settings)

@@ -1,26 +1,29 @@
-"""The relational network in Lightning: mini-batches, early stopping, learning curves."""
+"""The relational network in training."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import ceil
 
-import lightning
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 from torch.optim import Adam, Optimizer
 from torch.optim.lr_scheduler import CosineAnnealingLR
 
 from guided_lgp.params import TrainRelational
-from guided_lgp.policy.encoding import INSTRUCTIONS
+from guided_lgp.policy.arrays import IntArray
+from guided_lgp.policy.paper.encoding import INSTRUCTIONS
 from guided_lgp.policy.relational.encoding import Range, applicable, graphs
 from guided_lgp.policy.relational.model import Weights
 from guided_lgp.policy.relational.network import RelationalNetwork
 from guided_lgp.policy.relational.samples import Examples
-from guided_lgp.policy.training import Learning, one_quiet_thread, train
-
-CURVES = ("training_loss", "training_accuracy", "validation_loss", "validation_accuracy")
+from guided_lgp.policy.training import (
+    Learning,
+    PolicyModule,
+    confusion_matrix,
+    one_quiet_thread,
+    train,
+)
 
 Batch = tuple[Tensor, Tensor, Tensor, Tensor, Tensor]
 """Nodes, edges, held, applicable and right actions."""
@@ -53,15 +56,13 @@ class Batches:
             yield nodes, edges, held, allowed, right
 
 
-class RelationalPolicyModule(lightning.LightningModule):
+class RelationalModule(PolicyModule):
     """Adam on the cross-entropy between the right actions, each as probable, and the policy."""
 
     def __init__(self, network: RelationalNetwork, settings: TrainRelational) -> None:
         super().__init__()
         self.network = network
-        self.curves: dict[str, list[float]] = {name: [] for name in CURVES}
         self._settings = settings
-        self._sums = {"training": [0.0, 0.0, 0.0], "validation": [0.0, 0.0, 0.0]}
 
     def configure_optimizers(self) -> tuple[list[Optimizer], list[CosineAnnealingLR]]:
         """Adam with L2 regularisation; the learning rate falls to zero along a cosine."""
@@ -79,29 +80,13 @@ class RelationalPolicyModule(lightning.LightningModule):
         """Loss and accuracy on the validation examples."""
         self._loss("validation", batch)
 
-    def on_train_epoch_end(self) -> None:
-        """Note the curves; Lightning validates before this is called."""
-        self._note("training")
-
-    def on_validation_epoch_end(self) -> None:
-        """Note the curves, and log the loss, by which training stops."""
-        self._note("validation")
-        self.log("validation_loss", self.curves["validation_loss"][-1])
-
     def _loss(self, split: str, batch: Batch) -> Tensor:
         log_p, right = log_probabilities(self.network, batch), batch[-1].flatten(1)
         shares = right / right.sum(1, keepdim=True)
         loss = -(shares * log_p.masked_fill(~right, 0)).sum(1).mean()
         hits = right.gather(1, log_p.argmax(1, keepdim=True)).float().sum()
-        for index, value in enumerate((loss.item() * len(right), hits.item(), len(right))):
-            self._sums[split][index] += value
+        self.count(split, len(right), loss.item(), hits.item())
         return loss
-
-    def _note(self, split: str) -> None:
-        loss, hits, count = self._sums[split]
-        self.curves[f"{split}_loss"].append(loss / count)
-        self.curves[f"{split}_accuracy"].append(hits / count)
-        self._sums[split] = [0.0, 0.0, 0.0]
 
 
 def log_probabilities(network: RelationalNetwork, batch: Batch) -> Tensor:
@@ -144,7 +129,7 @@ def fit(
     with one_quiet_thread(), torch.random.fork_rng(devices=[]):
         torch.manual_seed(int(weights.generate_state(1)[0]))
         network = RelationalNetwork(settings.width, settings.rounds)
-        module = RelationalPolicyModule(network, settings)
+        module = RelationalModule(network, settings)
         best_epoch = train(module, batches, held_out, settings.epochs, settings.patience)
         confusion = _confusion(network, held_out)
     tensors = {name: part.numpy().copy() for name, part in network.state_dict().items()}
@@ -157,13 +142,15 @@ def fit(
 
 
 @torch.no_grad()
-def _confusion(network: RelationalNetwork, batches: Batches) -> NDArray[np.int64]:
+def _confusion(network: RelationalNetwork, batches: Batches) -> IntArray:
     count = len(INSTRUCTIONS)
-    confusion = torch.zeros(count * count, dtype=torch.int64)
+    confusion = np.zeros((count, count), dtype=np.int64)
     for batch in batches:
         log_p, held, right = log_probabilities(network, batch), batch[2], batch[-1]
         place = (held >= 0)[..., None].expand_as(right).flatten(1).long()
         truth = log_p.masked_fill(~right.flatten(1), -torch.inf).argmax(1, keepdim=True)
-        cell = count * place.gather(1, truth) + place.gather(1, log_p.argmax(1, keepdim=True))
-        confusion += torch.bincount(cell.flatten(), minlength=count * count)
-    return confusion.view(count, count).numpy()
+        chosen = log_p.argmax(1, keepdim=True)
+        confusion += confusion_matrix(
+            place.gather(1, truth).flatten(), place.gather(1, chosen).flatten(), count
+        )
+    return confusion

@@ -13,7 +13,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from guided_lgp.policy.models import Layers
+from guided_lgp.policy.paper.model import Layers
 
 _RESOLUTION = 1 << 16
 """Dropout compares 16 random bits per node with its rate."""

@@ -9,17 +9,18 @@ import pandas as pd
 import pyarrow as pa
 import pytest
 import yaml
-from test_protocols import NothingOnBlue
 
 from guided_lgp.errors import InputError
-from guided_lgp.experiments import feasibility, studies
 from guided_lgp.experiments.enumerate_sequences import shortest_table, verdict_table
 from guided_lgp.experiments.files import write_table
 from guided_lgp.logic import one_goal_objectives, satisfied, two_goal_objectives
-from guided_lgp.params import Variant, load_params
-from guided_lgp.report.studies import render
+from guided_lgp.params import SampleRecipe, load_params
 from guided_lgp.scene import generate
 from guided_lgp.search.enumerate import enumerate_sequences
+from guided_lgp.studies import evaluate, feasibility, train
+from guided_lgp.studies.cases import OUTCOMES, load_study
+from guided_lgp.studies.tables import render
+from stand_ins import NothingOnBlue
 
 ROOT = Path(__file__).parents[2]
 NETWORK = {
@@ -115,11 +116,11 @@ def copy_models(root: Path) -> None:
 
 
 def test_train_evaluate_render(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(studies, "SceneBounds", NothingOnBlue)
+    monkeypatch.setattr(evaluate, "SceneBounds", NothingOnBlue)
     enumerate_all(root, "training", 2)
     enumerate_all(root, "test", 1)
     for case in STUDY["cases"]:
-        studies.train(root, case)
+        train.train(root, case)
     dropouts = {
         case: json.loads((root / f"data/studies/{case}/11/grasp.json").read_text())["training"][
             "dropout"
@@ -128,7 +129,7 @@ def test_train_evaluate_render(root: Path, monkeypatch: pytest.MonkeyPatch) -> N
     }
     assert dropouts == {"paper": 0.1, "shuffled": 0.0}
     for table in STUDY["tables"]:
-        studies.evaluate(root, table)
+        evaluate.evaluate(root, table)
     spread = json.loads((root / "reports/studies/spread.json").read_text())
     assert list(spread) == ["paper", "relational"]
     for planners in spread.values():
@@ -136,7 +137,7 @@ def test_train_evaluate_render(root: Path, monkeypatch: pytest.MonkeyPatch) -> N
         for figures in planners.values():
             for values in figures.values():
                 assert len(values["n"]) == len(STUDY["seeds"])
-                outcomes = [values[name] for name in studies.OUTCOMES]
+                outcomes = [values[name] for name in OUTCOMES]
                 assert [sum(run) for run in zip(*outcomes, strict=True)] == pytest.approx(
                     [1.0] * len(values["n"])
                 )
@@ -191,28 +192,28 @@ def with_case(**changes: Any) -> dict[str, Any]:
 def test_bad_parameters(root: Path, change: dict[str, Any], fault: str) -> None:
     write(root, STUDY | change)
     with pytest.raises(InputError, match=fault):
-        studies.load_study(root)
+        load_study(root)
 
 
 def test_unknown_cases_are_refused(root: Path) -> None:
     with pytest.raises(InputError, match=r"case 'none': is unknown .*paper, relational"):
-        studies.train(root, "none")
+        train.train(root, "none")
     with pytest.raises(InputError, match=r"table 'none': is unknown .*spread"):
-        studies.evaluate(root, "none")
+        evaluate.evaluate(root, "none")
 
 
 def test_the_declared_studies() -> None:
     """The cases called paper and improved are the pipeline's; the outputs are those of dvc.yaml."""
-    study, params = studies.load_study(ROOT)
+    study, params = load_study(ROOT)
     pipeline = load_params(ROOT / "params.yaml")
     assert params == pipeline
     assert len(study.seeds) >= 3
     for name in ("paper", "improved", "relational"):
         case = study.cases[name]
-        differing = case.model_dump(exclude_defaults=True, exclude={"title", "policy", "variant"})
+        differing = case.model_dump(exclude_defaults=True, exclude={"title", "policy", "recipe"})
         assert not differing
-    assert study.cases["paper"].variant == study.cases["relational"].variant == Variant()
-    assert study.cases["improved"].variant == pipeline.build_dataset.improved
+    assert study.cases["paper"].recipe == study.cases["relational"].recipe == SampleRecipe()
+    assert study.cases["improved"].recipe == pipeline.build_dataset.improved
     stages = yaml.safe_load((ROOT / "studies/dvc.yaml").read_text())["stages"]
     figures = {name for out in stages["feasibility"]["outs"] for name in out}
     assert figures == {f"reports/studies/feasibility{part}.json" for part in ("", "_timing")}

@@ -14,11 +14,11 @@ from scipy.optimize import minimize_scalar
 from guided_lgp.errors import InputError
 from guided_lgp.logic import Action, Objective, State
 from guided_lgp.params import Network
-from guided_lgp.policy.encoding import FloatArray
-from guided_lgp.policy.inference import HierarchicalPolicy, chain_log_probabilities
-from guided_lgp.policy.models import Layers
+from guided_lgp.policy.arrays import FloatArray
+from guided_lgp.policy.declaration import TrainedPolicy
+from guided_lgp.policy.paper.inference import chain_log_probabilities
+from guided_lgp.policy.paper.model import Layers
 from guided_lgp.policy.relational.encoding import SIDES
-from guided_lgp.policy.relational.inference import RelationalPolicy
 from guided_lgp.scene import GRIPPERS
 
 FEATURES = (
@@ -109,9 +109,7 @@ class FeasibilityAware:
     Every action keeps a finite score; none is excluded.
     """
 
-    def __init__(
-        self, policy: HierarchicalPolicy | RelationalPolicy, classifier: FeasibilityClassifier
-    ) -> None:
+    def __init__(self, policy: TrainedPolicy, classifier: FeasibilityClassifier) -> None:
         self._policy = policy
         self._classifier = classifier
 
@@ -143,7 +141,7 @@ def train_classifier(
     Raises:
         InputError: too few configurations to hold one out, or a training that diverges at once.
     """
-    from guided_lgp.policy.training import fit  # torch, which planning does not need
+    from guided_lgp.policy.paper.training import fit  # torch, which planning does not need
 
     choice, training = np.random.SeedSequence(seed).spawn(2)
     units = np.random.default_rng(choice).permutation(np.unique(verdicts.configuration))

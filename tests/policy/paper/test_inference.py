@@ -14,10 +14,11 @@ from synthetic import make_scene, positions_along
 from guided_lgp.bounds.results import Array
 from guided_lgp.errors import InputError
 from guided_lgp.logic import Action, Objective, State, parse_objective, parse_skeleton, progress
-from guided_lgp.policy.encoding import CHAINS, Encoding
-from guided_lgp.policy.inference import FLOOR, load_policy
-from guided_lgp.policy.models import Model
-from guided_lgp.policy.networks import Classifier
+from guided_lgp.policy.paper.encoding import CHAINS, Encoding
+from guided_lgp.policy.paper.inference import FLOOR, load_networks
+from guided_lgp.policy.paper.model import Model
+from guided_lgp.policy.paper.network import Classifier
+from guided_lgp.policy.registry import load_policy
 from guided_lgp.scene import Scene
 
 GRIPPERS, BOXES = ("pr2L", "pr2R"), ("red", "green", "blue")
@@ -67,7 +68,7 @@ def situation(scene: Scene) -> Situation:
 
 
 def test_probabilities_of_all_actions_sum_to_one(models: Path, situation: Situation) -> None:
-    p = np.exp(load_policy(models).log_probabilities(*situation, ACTIONS))
+    p = np.exp(load_networks(models, "train_policy").log_probabilities(*situation, ACTIONS))
     assert p.sum() == pytest.approx(1, abs=1e-6)
     assert p.max() > 2 * p.min()
 
@@ -102,12 +103,12 @@ def test_scores_are_the_product_of_the_conditionals_of_torch(
             previous = one_hot(2, gripper) + one_hot(3, box)
             p *= conditional("place", "table", previous, TABLES.index(action.table))
         expected.append(p)
-    scores = load_policy(models).log_probabilities(*situation, ACTIONS)
+    scores = load_networks(models, "train_policy").log_probabilities(*situation, ACTIONS)
     np.testing.assert_allclose(np.exp(scores), expected, atol=1e-6)
 
 
 def test_scores_follow_the_actions_asked_for(models: Path, situation: Situation) -> None:
-    policy = load_policy(models)
+    policy = load_networks(models, "train_policy")
     scores = policy.log_probabilities(*situation, ACTIONS)
     order = np.random.default_rng(0).permutation(len(ACTIONS))[:7]
     some = policy.log_probabilities(*situation, [ACTIONS[index] for index in order])
@@ -118,7 +119,7 @@ def test_an_action_on_a_symbol_without_slot_has_the_floor(models: Path, scene: S
     pink = scene.boxes[0].model_copy(update={"name": "pink"})
     larger = scene.model_copy(update={"boxes": (*scene.boxes, pink)})
     positions = positions_along(larger, ())[0]
-    policy = load_policy(models)
+    policy = load_networks(models, "train_policy")
     actions = [Action("grasp", ("pr2L", box)) for box in ("red", "pink")]
     for goal, floor in (("(held red)", [False, True]), ("(held pink)", [False, False])):
         objective = parse_objective([goal])
@@ -128,8 +129,8 @@ def test_an_action_on_a_symbol_without_slot_has_the_floor(models: Path, scene: S
 
 def test_planning_does_not_need_torch(models: Path) -> None:
     program = (
-        "import sys, pathlib; from guided_lgp.policy.inference import load_policy;"
-        f"load_policy(pathlib.Path({str(models)!r}));"
+        "import sys, pathlib; from guided_lgp.policy.registry import load_policy;"
+        f"load_policy('paper', pathlib.Path({str(models)!r}));"
         "sys.exit(bool({'torch', 'lightning', 'pandas'} & set(sys.modules)))"
     )
     assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0
@@ -145,7 +146,7 @@ def test_saved_twice_the_bytes_are_equal(models: Path, tmp_path: Path) -> None:
 
 def test_without_chain_the_choices_are_independent(tmp_path: Path, situation: Situation) -> None:
     save(tmp_path, Encoding(chain=False))
-    p = np.exp(load_policy(tmp_path).log_probabilities(*situation, ACTIONS))
+    p = np.exp(load_networks(tmp_path, "train_policy").log_probabilities(*situation, ACTIONS))
     assert p.sum() == pytest.approx(1, abs=1e-6)
     place = p[6:].reshape(2, 3, 5)
     independent = np.einsum(
@@ -163,7 +164,7 @@ def test_missing_and_damaged_files_name_the_stage(
     if damage is not None:
         (models / name).write_bytes(damage)
     with pytest.raises(InputError, match=rf"{name}:? .*train_policy"):
-        load_policy(models)
+        load_networks(models, "train_policy")
 
 
 @pytest.mark.parametrize(
@@ -186,7 +187,7 @@ def test_models_that_do_not_fit_are_refused(
     document = json.loads((models / "place.json").read_text())
     (models / "place.json").write_text(json.dumps(document | change))
     with pytest.raises(InputError, match=rf"place\.(json|safetensors).*{fault}.*train_policy"):
-        load_policy(models)
+        load_networks(models, "train_policy")
 
 
 @pytest.mark.parametrize(
@@ -205,7 +206,7 @@ def test_weights_that_do_not_fit_are_refused(models: Path, bias: Array) -> None:
     path = models / "grasp.safetensors"
     save_file(load_file(path) | {"box.1.bias": bias}, path)
     with pytest.raises(InputError, match=r"grasp\.safetensors: box\.1: .*train_policy"):
-        load_policy(models)
+        load_networks(models, "train_policy")
 
 
 @pytest.mark.parametrize("kind", [torch.bfloat16, torch.float8_e4m3fn])
@@ -214,7 +215,7 @@ def test_weights_of_types_that_numpy_lacks_are_refused(models: Path, kind: torch
     tensors = {name: torch.from_numpy(part) for name, part in load_file(path).items()}
     safetensors.torch.save_file(tensors | {"box.1.bias": torch.zeros(80, dtype=kind)}, path)
     with pytest.raises(InputError, match=r"grasp\.safetensors: .*train_policy"):
-        load_policy(models)
+        load_networks(models, "train_policy")
 
 
 @pytest.mark.parametrize(
@@ -234,7 +235,7 @@ def test_impossible_encodings_are_refused(models: Path, change: dict[str, object
     document["encoding"] |= change
     (models / "place.json").write_text(json.dumps(document))
     with pytest.raises(InputError, match=r"place\.json: encoding: is not .*train_policy"):
-        load_policy(models)
+        load_networks(models, "train_policy")
 
 
 def test_networks_of_different_encodings_are_refused(models: Path, tmp_path: Path) -> None:
@@ -242,14 +243,14 @@ def test_networks_of_different_encodings_are_refused(models: Path, tmp_path: Pat
     for name in ("grasp.json", "grasp.safetensors"):
         (models / name).write_bytes((tmp_path / "wide" / name).read_bytes())
     with pytest.raises(InputError, match="different encodings"):
-        load_policy(models)
+        load_networks(models, "train_policy")
 
 
 def test_the_improved_policy_has_a_folder_of_its_own(models: Path) -> None:
     with pytest.raises(InputError, match=r"improved/instruction\.json: .*train_improved"):
-        load_policy(models, "improved")
+        load_policy("improved", models)
     save(models / "improved", Encoding(chain=False))
-    assert not load_policy(models, "improved").encoding.chain
-    assert load_policy(models).encoding.chain
+    assert not load_policy("improved", models).encoding.chain
+    assert load_networks(models, "train_policy").encoding.chain
     with pytest.raises(InputError, match=r"policy 'other': is unknown .*paper, improved"):
-        load_policy(models, "other")
+        load_policy("other", models)

@@ -4,7 +4,7 @@ import pytest
 from guided_lgp.domains import load_domain
 from guided_lgp.errors import InputError
 from guided_lgp.logic import Action, State, Symbols, parse_objective
-from guided_lgp.policy.encoding import CHAINS, NOWHERE, Encoding
+from guided_lgp.policy.paper.encoding import CHAINS, NOWHERE, Encoding
 
 ENCODING = Encoding()
 ON_TABLES = State.of({"red": "tab1", "green": "tab1", "blue": "tab2"})
@@ -191,7 +191,7 @@ def test_named_boxes_fill_the_first_slots(symbols: Symbols) -> None:
 
 
 def test_what_the_state_means_by_hand(symbols: Symbols) -> None:
-    encoding = Encoding(meaning=True)
+    encoding = Encoding(symbolic_state=True)
     state = State.of({"red": "tray", "green": "red"}, {"blue": "pr2R"})
     three = load_domain().symbols(gripper=MANY.grippers, box=MANY.boxes[:3], table=MANY.surfaces)
     slots = encoding.fill(parse_objective(["(held blue)", "(on red tab1)"]), state, three)

@@ -8,14 +8,10 @@ from numpy.typing import NDArray
 
 from guided_lgp.errors import InputError
 from guided_lgp.logic import Action, Objective, State
-from guided_lgp.policy.encoding import CHAINS, INSTRUCTIONS, Encoding, FloatArray
-from guided_lgp.policy.models import Layers, Model, load_model
-from guided_lgp.policy.relational.inference import RelationalPolicy, load_relational
+from guided_lgp.policy.arrays import FloatArray
+from guided_lgp.policy.paper.encoding import CHAINS, INSTRUCTIONS, Encoding
+from guided_lgp.policy.paper.model import Layers, Model, load_model
 from guided_lgp.policy.symbols import declared_symbols
-
-POLICIES = ("paper", "improved", "relational")
-"""The trained policies: the paper's networks, the same ones with the improved recipe, and one
-network for any number of symbols."""
 
 FLOOR = np.log(1e-6)
 """Log-probability of an action on a symbol that fills no slot: the networks cannot see it, and a
@@ -67,25 +63,17 @@ class HierarchicalPolicy:
         return scores
 
 
-def load_policy(directory: Path, name: str = "paper") -> HierarchicalPolicy | RelationalPolicy:
-    """Read a trained policy; torch is not needed.
+def load_networks(directory: Path, stage: str) -> HierarchicalPolicy:
+    """Read the trained networks of a hierarchical policy; torch is not needed.
 
     Args:
-        directory: the folder ``models``, or one with the same files.
-        name: one of :data:`POLICIES`.
+        directory: the folder of their files.
+        stage: the stage that makes them, for the message.
 
     Raises:
         InputError: a file is missing, damaged, of another version, or the networks were trained
-            with different encodings; the message names the stage that makes them. Or there is no
-            policy of that name.
+            with different encodings.
     """
-    if name not in POLICIES:
-        raise InputError(f"policy {name!r}", "is unknown", ", ".join(POLICIES))
-    if name == "relational":
-        return load_relational(directory)
-    stage = "train_policy"
-    if name == "improved":
-        directory, stage = directory / name, "train_improved"
     models = {network: load_model(directory, network, stage) for network in CHAINS}
     if len({model.encoding for model in models.values()}) > 1:
         raise InputError(

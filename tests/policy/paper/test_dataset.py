@@ -24,10 +24,10 @@ from guided_lgp.logic import (
     two_goal_objectives,
     unsatisfied,
 )
-from guided_lgp.params import Variant
-from guided_lgp.policy.dataset import Dataset, load_dataset
-from guided_lgp.policy.encoding import INSTRUCTIONS
-from guided_lgp.policy.samples import build_dataset
+from guided_lgp.params import SampleRecipe
+from guided_lgp.policy.paper.dataset import Dataset, load_dataset
+from guided_lgp.policy.paper.encoding import INSTRUCTIONS
+from guided_lgp.policy.paper.samples import build_dataset
 from guided_lgp.policy.split import training_objectives
 
 
@@ -113,7 +113,7 @@ def test_supports_are_those_of_the_symbolic_states(world: Enumeration, dataset: 
 
 
 def build(world: Enumeration, objectives: list[Objective], **changes: Any) -> Dataset:
-    variant = Variant(**changes)
+    variant = SampleRecipe(**changes)
     return build_dataset(world.scenes, world.sequences, world.shortest, objectives, 0, variant)
 
 
@@ -209,7 +209,7 @@ def test_variant_with_relative_positions(
 def test_variant_with_what_the_state_means(
     world: Enumeration, objectives: list[Objective], dataset: Dataset
 ) -> None:
-    variant = build(world, objectives, meaning=True)
+    variant = build(world, objectives, symbolic_state=True)
     encoding, symbols = variant.encoding, variant.symbols
     assert encoding.input_size == len(set(encoding.input_names)) == 41 + 2 + 3 * 7
     assert (variant.states[:, :21] == dataset.states).all()

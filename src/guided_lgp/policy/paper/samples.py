@@ -25,14 +25,15 @@ from guided_lgp.logic import (
     successor,
     unsatisfied,
 )
-from guided_lgp.params import Variant
-from guided_lgp.policy.dataset import Dataset
-from guided_lgp.policy.encoding import Encoding, FloatArray, Slots
+from guided_lgp.params import SampleRecipe
+from guided_lgp.policy.arrays import BoolArray, FloatArray, IntArray
+from guided_lgp.policy.paper.dataset import Dataset
+from guided_lgp.policy.paper.encoding import Encoding, Slots
 from guided_lgp.scene import Scene
 
 _LEAST_DEVIATION = 1e-3  # m; less is no information, and scaling it up would be noise
 _NONE = -1
-PAPER = Variant()
+PAPER = SampleRecipe()
 _VERDICTS = pa.schema(
     [
         pa.field("configuration", pa.string(), nullable=False),
@@ -50,9 +51,6 @@ _LENGTHS = pa.schema(
 )
 _ENUMERATION = "the output of the stage enumerate_sequences for the same scenes"
 
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.int64]
-
 
 def build_dataset(
     scenes: Sequence[Scene],
@@ -60,7 +58,7 @@ def build_dataset(
     shortest: Path,
     objectives: Sequence[Objective],
     slack: int,
-    variant: Variant = PAPER,
+    recipe: SampleRecipe = PAPER,
     seed: int = 0,
 ) -> Dataset:
     """Collect the samples of the training configurations and objectives.
@@ -75,24 +73,24 @@ def build_dataset(
         shortest: Parquet file of the shortest feasible lengths, from the same stage.
         objectives: the training objectives.
         slack: extra actions.
-        variant: what differs from the paper.
-        seed: of the order of the boxes, in a variant that draws it.
+        recipe: what differs from the paper.
+        seed: of the order of the boxes, in a recipe that draws it.
 
     Raises:
         InputError: a file is missing or does not fit the scenes; no sample results.
     """
     encoding = Encoding(
-        chain=variant.chain,
-        named_first=variant.boxes == "named_first",
-        relative=variant.relative,
-        meaning=variant.meaning,
+        chain=recipe.chain,
+        named_first=recipe.boxes == "named_first",
+        relative=recipe.relative,
+        symbolic_state=recipe.symbolic_state,
     )
     symbols = _common_symbols(scenes, encoding)
     lengths = _shortest_lengths(shortest, scenes, objectives)
     verdicts = _read(sequences, _VERDICTS)
     feasible = verdicts[verdicts["feasible"]]
     rows_of = {str(name): rows for name, rows in feasible.groupby("configuration")}
-    goals = _GoalCodes(objectives, symbols, encoding, variant)
+    goals = _GoalCodes(objectives, symbols, encoding, recipe)
     declared = Slots(symbols.grippers, symbols.boxes, symbols.surfaces, goals=())
     orders = [replace(declared, boxes=boxes) for boxes in permutations(symbols.boxes)]
 
@@ -102,10 +100,10 @@ def build_dataset(
     for index, scene in enumerate(scenes):
         rows = rows_of.get(scene.name, feasible.iloc[:0])
         slots = [declared] * len(rows)
-        if variant.boxes == "random":
+        if recipe.boxes == "random":
             rng = np.random.default_rng(np.random.SeedSequence([seed, index]))
             slots = [orders[draw] for draw in rng.integers(len(orders), size=len(rows))]
-        elif variant.boxes == "named_first":  # the goals choose among all orders
+        elif recipe.boxes == "named_first":  # the goals choose among all orders
             slots = [order for order in orders for _ in range(len(rows))]
             rows = pd.concat([rows] * len(orders))
         paths = _feasible_sequences(scene, rows, slots, encoding, str(sequences))
@@ -125,10 +123,10 @@ def build_dataset(
     if not sum(map(len, sample_state)):
         fault = "no training objective has a feasible sequence"
         raise InputError(str(sequences), fault, _ENUMERATION)
-    if variant.normalised:
+    if recipe.normalised:
         encoding = _normalising(encoding, encoding.coordinates(np.concatenate(states)))
     encoded = encoding.coordinates(np.concatenate(states))
-    if variant.meaning:
+    if recipe.symbolic_state:
         places = encoding.encode_places(np.concatenate(supports))
         encoded = np.concatenate([encoded, places], axis=1)
     return Dataset(
@@ -237,13 +235,13 @@ class _GoalCodes:
         objectives: Sequence[Objective],
         symbols: Symbols,
         encoding: Encoding,
-        variant: Variant,
+        recipe: SampleRecipe,
     ) -> None:
         self.codes: list[FloatArray] = []
         self._symbols = symbols
         self._objectives = objectives
         self._encoding = encoding
-        self._variant = variant
+        self._recipe = recipe
         self._row: dict[bytes, int] = {}
         self._rows_in: dict[tuple[State, Slots], IntArray] = {}
 
@@ -267,14 +265,14 @@ class _GoalCodes:
             for row, objective in zip(known, self._objectives, strict=True):
                 row[:2] = self._orders(objective, slots, state)
                 remaining = unsatisfied(state, objective)
-                if self._variant.adapted_goals and remaining not in ((), objective):
+                if self._recipe.adapted_goals and remaining not in ((), objective):
                     row[2:] = self._orders(remaining, slots, state)
             self._rows_in[state, slots] = known
         return known
 
     def _orders(self, goals: Objective, slots: Slots, state: State) -> tuple[int, int]:
         reverse = goals[::-1]
-        other = self._code(reverse, slots, state) if self._variant.both_orders else _NONE
+        other = self._code(reverse, slots, state) if self._recipe.both_orders else _NONE
         return self._code(goals, slots, state), other
 
     def _code(self, goals: Objective, slots: Slots, state: State) -> int:

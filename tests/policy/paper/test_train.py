@@ -7,11 +7,12 @@ from synthetic import Enumeration
 
 from guided_lgp.errors import InputError
 from guided_lgp.params import Network, Parallel, TrainPolicy
-from guided_lgp.policy.dataset import Dataset
-from guided_lgp.policy.encoding import CHAINS
-from guided_lgp.policy.samples import build_dataset
+from guided_lgp.policy.paper.dataset import Dataset
+from guided_lgp.policy.paper.encoding import CHAINS
+from guided_lgp.policy.paper.samples import build_dataset
+from guided_lgp.policy.paper.train import train_model, train_network
 from guided_lgp.policy.split import training_objectives
-from guided_lgp.policy.train import held_out_samples, train_model, train_network
+from guided_lgp.policy.splits import held_out_samples
 
 NETWORK = Network(layers=2, nodes=16, dropout=0.1, l2=1e-4, epochs=3, batch=64, lr=1e-3)
 SETTINGS = TrainPolicy(

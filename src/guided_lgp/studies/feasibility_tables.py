@@ -5,9 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from guided_lgp.documents import read_json
-from guided_lgp.experiments.feasibility import CLASSIFIER
-from guided_lgp.experiments.studies import RESULTS
 from guided_lgp.report.table import Table
+from guided_lgp.studies.cases import CLASSIFIER, RESULTS
 
 SEARCHES = {"adaptation": "greedy", "best_first": "best-first"}
 

@@ -14,7 +14,8 @@ from guided_lgp.documents import read_json, write_json, written_whole
 from guided_lgp.domains import load_domain
 from guided_lgp.errors import InputError
 from guided_lgp.logic import Objective, Symbols, parse_objective
-from guided_lgp.policy.encoding import CHAINS, INSTRUCTIONS, VERSION, Encoding, FloatArray
+from guided_lgp.policy.arrays import FloatArray, IntArray
+from guided_lgp.policy.paper.encoding import CHAINS, INSTRUCTIONS, VERSION, Encoding
 
 _SAMPLES = "samples.npz"
 _DOCUMENT = "dataset.json"
@@ -38,8 +39,6 @@ _DAMAGE = (
     *(BadZipFile, RuntimeError, zlib.error, TokenError),
 )
 """What NumPy, zipfile and zlib raise for damaged archives."""
-
-IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -105,7 +104,7 @@ class Dataset:
         raise KeyError(sub_policy)
 
     def class_names(self, sub_policy: str) -> tuple[str, ...]:
-        """The meaning of a sub-policy's classes."""
+        """The names of a sub-policy's classes."""
         return {
             "instruction": INSTRUCTIONS,
             "gripper": self.symbols.grippers,

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from guided_lgp.documents import read_json, write_text
-from guided_lgp.experiments.studies import OUTCOMES, RESULTS, StudyParams, StudyTable, load_study
-from guided_lgp.report.feasibility import feasibility_tables
 from guided_lgp.report.table import Record, Table
+from guided_lgp.studies.cases import OUTCOMES, RESULTS, StudyParams, StudyTable, load_study
+from guided_lgp.studies.feasibility_tables import feasibility_tables
 
 PLANNERS = {"default": "default", "adaptation": "adaptation", "best_first": "best-first"}
 SHOWN = (("shortest", "all"), ("shortest", "unseen"), ("no_solution", "all"))

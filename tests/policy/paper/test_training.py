@@ -4,19 +4,19 @@ import torch
 
 from guided_lgp.errors import InputError
 from guided_lgp.params import Network
-from guided_lgp.policy.training import Fit, Split, fit
+from guided_lgp.policy.paper.training import Fit, Samples, fit
 
 SETTINGS = Network(layers=2, nodes=32, dropout=0.1, l2=1e-4, epochs=60, batch=32, lr=3e-3)
 
 
-def problem(samples: int, seed: int = 0) -> Split:
+def problem(samples: int, seed: int = 0) -> Samples:
     """Three classes that the inputs decide about."""
     rng = np.random.default_rng(seed)
     inputs = rng.normal(size=(samples, 5)).astype(np.float32)
     return inputs, (inputs @ rng.normal(size=(5, 3))).argmax(axis=1)
 
 
-def train(training: Split, validation: Split, patience: int = 60, **changes: float) -> Fit:
+def train(training: Samples, validation: Samples, patience: int = 60, **changes: float) -> Fit:
     settings = SETTINGS.model_copy(update=changes)
     return fit(training, validation, 3, settings, patience, np.random.SeedSequence(1))
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from guided_lgp.errors import InputError
 from guided_lgp.logic import Action, Goal, Objective, State, Symbols, satisfied, unsatisfied
+from guided_lgp.policy.arrays import FloatArray
 
 VERSION = 1
 """Version of the encoding and of the files that hold it."""
@@ -34,9 +35,13 @@ NOWHERE = 127
 
 _MOST_SLOTS = 100
 _SLOTS = ("grippers", "boxes", "surfaces", "goals")
-_FLAGS = ("chain", "named_first", "relative", "meaning")
-
-FloatArray = NDArray[np.float32]
+_FLAGS = {
+    "chain": "chain",
+    "named_first": "named_first",
+    "relative": "relative",
+    "symbolic_state": "meaning",
+}
+"""The fields that are true or false, and their keys in files."""
 
 
 @dataclass(frozen=True)
@@ -67,8 +72,8 @@ class Encoding:
     no table), then the world x, y, z in m of every gripper, box and surface. With the default
     numbers of slots these are 2 · (2 + 3 + 5) + 7 · 3 = 41 numbers. An empty slot is zero.
 
-    The paper takes positions as they are. What differs in a variant is listed here; see
-    :class:`guided_lgp.params.Variant`. One that normalises positions gives ``centre`` and
+    The paper takes positions as they are. What other recipes change is listed here; see
+    :class:`guided_lgp.params.SampleRecipe`. One that normalises positions gives ``centre`` and
     ``scale``, one number each per coordinate: (position - centre) / scale. One that adds what the
     state means has one more number per goal, whether it holds, and, after the positions, for every
     box the one-hot of the table or gripper that it is at.
@@ -84,7 +89,7 @@ class Encoding:
     """Whether the boxes that goals name fill the first slots, in the order of the goals."""
     relative: bool = False
     """Whether positions are relative to the box in the first slot."""
-    meaning: bool = False
+    symbolic_state: bool = False
     """Whether the input says what the state means."""
     centre: tuple[float, ...] = ()
     scale: tuple[float, ...] = ()
@@ -92,7 +97,7 @@ class Encoding:
     @property
     def goal_size(self) -> int:
         """Length of one encoded goal."""
-        return len(GOAL_KINDS) + self.boxes + self.surfaces + self.boxes + self.meaning
+        return len(GOAL_KINDS) + self.boxes + self.surfaces + self.boxes + self.symbolic_state
 
     @property
     def position_size(self) -> int:
@@ -103,7 +108,7 @@ class Encoding:
     def state_size(self) -> int:
         """Length of the encoded state."""
         places = self.surfaces + self.boxes + self.grippers
-        return self.position_size + self.meaning * self.boxes * places
+        return self.position_size + self.symbolic_state * self.boxes * places
 
     @property
     def input_size(self) -> int:
@@ -112,7 +117,7 @@ class Encoding:
 
     @property
     def input_names(self) -> tuple[str, ...]:
-        """The meaning of every input, in order."""
+        """What every input stands for, in order."""
         boxes = [f"box{index}" for index in range(1, self.boxes + 1)]
         surfaces = [f"surface{index}" for index in range(1, self.surfaces + 1)]
         grippers = [f"gripper{index}" for index in range(1, self.grippers + 1)]
@@ -120,9 +125,9 @@ class Encoding:
             *GOAL_KINDS,
             *(f"box={name}" for name in boxes),
             *(f"table={name}" for name in surfaces + boxes),
-            *["holds"] * self.meaning,
+            *["holds"] * self.symbolic_state,
         ]
-        places = (surfaces + boxes + grippers) * self.meaning
+        places = (surfaces + boxes + grippers) * self.symbolic_state
         return (
             *(f"goal{index} {name}" for index in range(1, self.goals + 1) for name in goal),
             *(f"{name} {axis}" for name in grippers + boxes + surfaces for axis in "xyz"),
@@ -189,7 +194,7 @@ class Encoding:
             code[row, len(GOAL_KINDS) + slots.boxes.index(goal.box)] = 1
             if goal.table is not None:
                 code[row, len(GOAL_KINDS) + self.boxes + slots.tables.index(goal.table)] = 1
-            if self.meaning:
+            if self.symbolic_state:
                 code[row, -1] = satisfied(state, (goal,))
         return code.ravel()
 
@@ -210,7 +215,7 @@ class Encoding:
         world = [np.zeros(3) if name is None else positions[name] for name in slots.symbols]
         code = self.coordinates(np.concatenate(world).astype(np.float32)).reshape(-1, 3)
         code[empty] = 0
-        if not self.meaning:
+        if not self.symbolic_state:
             return code.ravel()
         supports = np.array(self.encode_supports(slots, state))
         return np.concatenate([code.ravel(), self.encode_places(supports)])
@@ -278,7 +283,7 @@ class Encoding:
         return {
             "version": VERSION,
             "slots": {name: getattr(self, name) for name in _SLOTS},
-            **{name: getattr(self, name) for name in _FLAGS},
+            **{key: getattr(self, name) for name, key in _FLAGS.items()},
             "normalisation": {"centre": list(self.centre), "scale": list(self.scale)},
             "inputs": list(self.input_names),
         }
@@ -316,7 +321,7 @@ class Encoding:
         try:
             encoding = cls(
                 **document["slots"],
-                **{name: document[name] for name in _FLAGS},
+                **{name: document[key] for name, key in _FLAGS.items()},
                 centre=tuple(document["normalisation"]["centre"]),
                 scale=tuple(document["normalisation"]["scale"]),
             )

@@ -18,21 +18,14 @@ from guided_lgp.bounds.results import Array, CoarseResult
 from guided_lgp.documents import write_json
 from guided_lgp.errors import InputError
 from guided_lgp.experiments.files import read_table
-from guided_lgp.experiments.studies import (
-    OUTCOMES,
-    PLANNERS,
-    RESULTS,
-    CoarseBounds,
-    Row,
-    load_study,
-    outcome,
-    problems,
-    shortest_lengths,
-)
 from guided_lgp.logic import Skeleton, format_objective, parse_skeleton, progress
 from guided_lgp.params import BoundsParams, SearchLimits
 from guided_lgp.paths import SCENES, SEQUENCES, TRAINED
-from guided_lgp.policy.feasibility import (
+from guided_lgp.policy.registry import POLICIES, load_policy
+from guided_lgp.scene import Scene, load_scenes
+from guided_lgp.search.observation import observe, start
+from guided_lgp.studies.cases import CLASSIFIER, OUTCOMES, RESULTS, load_study
+from guided_lgp.studies.classifier import (
     FeasibilityAware,
     FeasibilityClassifier,
     Verdicts,
@@ -40,14 +33,17 @@ from guided_lgp.policy.feasibility import (
     features,
     train_classifier,
 )
-from guided_lgp.policy.inference import POLICIES, load_policy
-from guided_lgp.scene import Scene, load_scenes
-from guided_lgp.search.observation import observe, start
+from guided_lgp.studies.evaluate import (
+    PLANNERS,
+    CoarseBounds,
+    Row,
+    outcome,
+    problems,
+    shortest_lengths,
+)
 
 SEARCHES = ("adaptation", "best_first")
 """Of the planners of the studies: greedy with reattempts, and best-first."""
-
-CLASSIFIER = ("without", "with")
 
 CALLS = ("coarse_calls", "infeasible_calls", "policy_calls")
 TIMES = ("coarse_s", "infeasible_s", "policy_s")
@@ -166,7 +162,7 @@ def evaluate(task: _Task) -> list[Row]:
     bounds = AskedBounds(task.scene, task.bounds)
     rows = []
     for name in POLICIES:
-        policy = load_policy(task.models, name)
+        policy = load_policy(name, task.models)
         scorers = (policy, FeasibilityAware(policy, task.classifier))
         for classified, scorer in zip(CLASSIFIER, scorers, strict=True):
             for search in SEARCHES:

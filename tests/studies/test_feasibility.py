@@ -6,18 +6,19 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from test_protocols import NothingOnBlue
 from test_studies import copy_models, enumerate_all, root
 
 from guided_lgp.errors import InputError
-from guided_lgp.experiments import feasibility, studies
 from guided_lgp.logic import parse_objective
 from guided_lgp.params import Network, SearchLimits, load_params
-from guided_lgp.policy.feasibility import FeasibilityAware, Verdicts, train_classifier
-from guided_lgp.report.feasibility import feasibility_tables, verdict
 from guided_lgp.scene import load_scenes
 from guided_lgp.search import best_first
 from guided_lgp.search.policy import Uniform
+from guided_lgp.studies import evaluate, feasibility
+from guided_lgp.studies.cases import OUTCOMES
+from guided_lgp.studies.classifier import FeasibilityAware, Verdicts, train_classifier
+from guided_lgp.studies.feasibility_tables import feasibility_tables, verdict
+from stand_ins import NothingOnBlue
 
 __all__ = ["root"]  # a fixture
 
@@ -27,7 +28,7 @@ NETWORK = Network(layers=1, nodes=8, dropout=0.0, l2=0.0, epochs=20, batch=64, l
 @pytest.fixture
 def outputs(root: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """What the pipeline leaves: sequences of up to two actions, and models."""
-    monkeypatch.setattr(studies, "SceneBounds", NothingOnBlue)
+    monkeypatch.setattr(evaluate, "SceneBounds", NothingOnBlue)
     enumerate_all(root, "training", 2)
     enumerate_all(root, "test", 1)
     copy_models(root)
@@ -54,8 +55,8 @@ def test_run_and_render(outputs: Path) -> None:
     for policy, searches in document["search"].items():
         for search, runs in searches.items():
             for classified, figures in runs.items():
-                assert figures["n"] == len(studies.problems(scene))
-                assert sum(figures[name] for name in studies.OUTCOMES) == pytest.approx(1)
+                assert figures["n"] == len(evaluate.problems(scene))
+                assert sum(figures[name] for name in OUTCOMES) == pytest.approx(1)
                 assert figures["coarse_calls"] > figures["infeasible_calls"] >= 0
                 time = times[policy][search][classified]
                 assert time["coarse_s"] == 0.5 * figures["coarse_calls"]
@@ -93,7 +94,7 @@ def test_a_complete_search_stays_complete(outputs: Path) -> None:
     limits = SearchLimits(
         max_depth=3, reattempts=0, max_tree_size=1000, max_paths=1, max_sequences=1000
     )
-    bounds = studies.CoarseBounds(scene, load_params(outputs / "params.yaml").bounds)
+    bounds = evaluate.CoarseBounds(scene, load_params(outputs / "params.yaml").bounds)
     trees = []
     for policy in (Uniform(), FeasibilityAware(Uniform(), classifier)):
         found = best_first.plan(

@@ -11,7 +11,8 @@ from safetensors.numpy import load_file, save
 
 from guided_lgp.documents import read_json, write_json, written_whole
 from guided_lgp.errors import InputError
-from guided_lgp.policy.encoding import CHAINS, VERSION, Encoding, FloatArray
+from guided_lgp.policy.arrays import FloatArray
+from guided_lgp.policy.paper.encoding import CHAINS, VERSION, Encoding
 
 Layers = tuple[tuple[FloatArray, FloatArray], ...]
 """Weight (outputs, inputs) and bias (outputs,) of every layer of a sub-policy."""

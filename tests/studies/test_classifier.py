@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 
+from guided_lgp.domains import load_domain
 from guided_lgp.errors import InputError
 from guided_lgp.logic import State, Symbols, applicable_actions, parse_objective, successor
 from guided_lgp.params import Network
-from guided_lgp.policy.feasibility import (
+from guided_lgp.search.policy import Uniform
+from guided_lgp.studies.classifier import (
     FEATURES,
     FeasibilityAware,
     FeasibilityClassifier,
@@ -16,7 +18,6 @@ from guided_lgp.policy.feasibility import (
     features,
     train_classifier,
 )
-from guided_lgp.search.policy import Uniform
 
 NETWORK = Network(layers=1, nodes=16, dropout=0.0, l2=0.0, epochs=40, batch=128, lr=1e-2)
 POSITIONS = {
@@ -29,6 +30,16 @@ POSITIONS = {
     "tab2": np.array([0.54, -0.33, 0.6]),
 }
 STATE = State.of({"red": "tab1", "green": "tab1", "blue": "red"})
+
+
+@pytest.fixture
+def symbols() -> Symbols:
+    names = {
+        "gripper": ("pr2L", "pr2R"),
+        "box": ("red", "green", "blue"),
+        "table": ("tab1", "tab2"),
+    }
+    return load_domain().symbols(**names)
 
 
 def out_of_reach(count: int, seed: int) -> tuple[Verdicts, np.ndarray]:

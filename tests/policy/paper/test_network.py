@@ -4,7 +4,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from guided_lgp.policy.networks import Classifier
+from guided_lgp.policy.paper.network import Classifier
 
 SIZES = (7, 6, 5, 4, 3)
 

@@ -1,0 +1,41 @@
+"""The policies: every package in this folder that declares some.
+
+A new policy is one package with ``DECLARATIONS`` in its ``__init__.py``; nothing else names it.
+"""
+
+from collections.abc import Mapping
+from importlib import import_module
+from pathlib import Path
+from pkgutil import iter_modules
+
+from guided_lgp import policy
+from guided_lgp.errors import InputError
+from guided_lgp.paths import MODELS
+from guided_lgp.policy.declaration import PolicyDeclaration, TrainedPolicy
+
+
+def _declared() -> Mapping[str, PolicyDeclaration]:
+    """Those of all packages, in the order of their names and of their declarations."""
+    packages = sorted(found.name for found in iter_modules(policy.__path__) if found.ispkg)
+    modules = [import_module(f"{policy.__name__}.{name}") for name in packages]
+    return {entry.name: entry for module in modules for entry in module.DECLARATIONS}
+
+
+POLICIES = _declared()
+"""Every policy by its name, in the order of tables and legends."""
+
+
+def load_policy(name: str, directory: Path = MODELS) -> TrainedPolicy:
+    """Read a trained policy; torch is not needed.
+
+    Args:
+        name: one of :data:`POLICIES`.
+        directory: the folder ``models`` of a pipeline; the weights of the program by default.
+
+    Raises:
+        InputError: there is no policy of that name; or a file is missing, damaged or of another
+            version: the message names the stage that makes it.
+    """
+    if name not in POLICIES:
+        raise InputError(f"policy {name!r}", "is unknown", ", ".join(POLICIES))
+    return POLICIES[name].load(directory)
