@@ -1,5 +1,7 @@
 """Both bounds of the NLP for one scene, each verdict computed once."""
 
+from functools import cached_property
+
 from guided_lgp.bounds.coarse import CoarseBound
 from guided_lgp.bounds.path import PathBound
 from guided_lgp.bounds.results import CoarseResult, PathResult
@@ -19,7 +21,7 @@ class SceneBounds:
     def __init__(self, scene: Scene, params: BoundsParams) -> None:
         self.scene = scene
         self._coarse_bound = CoarseBound(scene, params.coarse_tries)
-        self._path_bound = PathBound(scene, self._coarse_bound, params.path_solutions)
+        self._path_solutions = params.path_solutions
         self._coarse: dict[Skeleton, CoarseResult] = {}
         self._path: dict[Skeleton, PathResult] = {}
 
@@ -46,3 +48,8 @@ class SceneBounds:
                 result = PathResult(skeleton, feasible=False, failure=coarse.failure)
             self._path[skeleton] = result
         return result
+
+    @cached_property
+    def _path_bound(self) -> PathBound:
+        """Built when first asked: most skeletons never get so far."""
+        return PathBound(self.scene, self._coarse_bound, self._path_solutions)

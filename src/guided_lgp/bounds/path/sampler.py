@@ -171,7 +171,9 @@ class OutcomeSampler:
         if isinstance(line, str):
             task.record(index, Stage.LINE_IN, f"{line} on the way in")
             return None
-        reached = task.after(situation, [Motion(gripper, line[::-1])])
+        # Full turns of a joint move the hand in the last bit only, but what is let go of keeps it.
+        at = line[::-1] if action.body in situation.carried else wound(line[::-1], start)
+        reached = task.after(situation, [Motion(gripper, at)])
         switch = self._switch(index, reached)
         switched = replace(task.after(reached, switch), state=task.states[index + 1])
         if leaving != gripper:
