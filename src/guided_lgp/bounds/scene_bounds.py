@@ -3,7 +3,7 @@
 from functools import cached_property
 
 from guided_lgp.bounds.coarse import CoarseBound
-from guided_lgp.bounds.path import PathBound
+from guided_lgp.bounds.path import PathBound, check_motions
 from guided_lgp.bounds.results import CoarseResult, PathResult
 from guided_lgp.logic import Skeleton
 from guided_lgp.params import BoundsParams
@@ -19,6 +19,7 @@ class SceneBounds:
     """
 
     def __init__(self, scene: Scene, params: BoundsParams) -> None:
+        check_motions(scene.symbols.domain)
         self.scene = scene
         self._coarse_bound = CoarseBound(scene, params.coarse_tries)
         self._path_solutions = params.path_solutions

@@ -18,9 +18,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from guided_lgp.bounds.path.declared import GroundInstruction, GroundTerm
 from guided_lgp.bounds.results import Array
 from guided_lgp.errors import InputError
+from guided_lgp.logic import Action, Domain, GroundInstruction, GroundTerm
 
 _ONCE = ("transit", "line_in", "switch", "line_out")
 STEPS = ("present", *_ONCE, "home")
@@ -118,6 +118,17 @@ def manoeuvre(declared: GroundInstruction) -> Manoeuvre:
     )
 
 
+def check_motions(domain: Domain) -> None:
+    """Read the motion of every instruction of a domain.
+
+    Raises:
+        InputError: one of them cannot be carried out, see :func:`manoeuvre`.
+    """
+    for instruction in domain.instructions:
+        names = tuple(parameter.name for parameter in instruction.parameters)
+        manoeuvre(domain.bind(Action(instruction.name, names)))
+
+
 def _way_in(where: str, step: GroundTerm) -> Line:
     direction, length, otherwise = _direction(where, step)
     ways = [_straight(name, length) for name in (direction, otherwise) if name]
@@ -142,7 +153,7 @@ def _direction(where: str, step: GroundTerm) -> tuple[str, float, str]:
     given = {name: length for name, length in step.options.items() if name != "otherwise"}
     otherwise = str(step.options.get("otherwise", ""))
     known = set(given) <= set(_DIRECTIONS) and (not otherwise or otherwise in _DIRECTIONS)
-    if len(given) != 1 or not known or not all(isinstance(v, float) for v in given.values()):
+    if len(given) != 1 or not known or not all(isinstance(v, int | float) for v in given.values()):
         accepted = f"one of {', '.join(_DIRECTIONS)} with a length in m, otherwise=one of them"
         raise InputError(f"{where}: {step.name}", "has no direction", accepted)
     ((direction, length),) = given.items()

@@ -6,7 +6,6 @@ from enum import IntEnum
 
 import numpy as np
 
-from guided_lgp.bounds.path.declared import bind
 from guided_lgp.bounds.path.grips import Grips
 from guided_lgp.bounds.path.ik import REACH, Arm, continuous_near
 from guided_lgp.bounds.path.motions import Motion, Mover, Surroundings, Tool, Transit
@@ -119,7 +118,8 @@ class Task:
     ) -> None:
         self.mover = mover
         self.arms = mover.arms
-        self.manoeuvres = [manoeuvre(bind(action)) for action in skeleton]
+        domain = scene.symbols.domain
+        self.manoeuvres = [manoeuvre(domain.bind(action)) for action in skeleton]
         self.contacts = contacts
         self.failure = failure
         self.rng = np.random.default_rng(np.random.SeedSequence([7, seed]))

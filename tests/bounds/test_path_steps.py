@@ -1,0 +1,64 @@
+import numpy as np
+import pytest
+
+from guided_lgp.bounds.path.steps import check_motions, manoeuvre
+from guided_lgp.domains import load_domain
+from guided_lgp.errors import InputError
+from guided_lgp.logic import Action, Domain
+from guided_lgp.logic.declarations import Instruction, Term, Type, attach, terms
+
+Gripper, Table = Type("gripper"), Type("table")
+Box = Type("box", also=(Table,), parents=(Gripper, Table))
+g, b = Gripper("gripper"), Box("box")
+present, transit, line_in, switch, line_out, home, fly = terms(
+    "present transit line_in switch line_out home fly"
+)
+MOTION = (transit(g), line_in(g, back=0.05), switch(close=g), line_out(g, up=0.1))
+
+
+def domain(*motion: Term) -> Domain:
+    snatch = Instruction("snatch", (g, b), (), (attach(b, g),), motion=motion)
+    return Domain("test", (Gripper, Table, Box), (snatch,), ())
+
+
+def test_a_motion_is_read_as_it_is_declared() -> None:
+    bound = domain(present(b), *MOTION, home(g)).bind(Action("snatch", ("pr2L", "red")))
+    read = manoeuvre(bound)
+    assert (read.name, read.gripper, read.body, read.parent) == ("snatch", "pr2L", "red", "pr2L")
+    assert (read.presented, read.closing, read.opening) == (("red",), "pr2L", None)
+    assert read.homes == ("pr2L",)
+    down = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])  # approach from above
+    assert read.way_in.ways[0].of(down) == pytest.approx([0, 0, 0.05])
+    assert read.way_out.ways[0].of(np.eye(3)) == pytest.approx([0, 0, 0.1])
+
+
+def test_other_ways_follow_the_declared_one() -> None:
+    motion = (transit(g), line_in(g, down=0.05, otherwise="back"), *MOTION[2:])
+    ways = manoeuvre(domain(*motion).bind(Action("snatch", ("pr2L", "red")))).way_in.ways
+    assert [way.of(np.eye(3)).tolist() for way in ways] == [[0, 0, 0.05], [-0.05, 0, 0]]
+
+
+def test_the_domains_of_the_project_can_be_moved() -> None:
+    check_motions(load_domain())
+
+
+@pytest.mark.parametrize(
+    ("motion", "message"),
+    [
+        (
+            (*MOTION, fly(g)),
+            "motion of snatch: fly: is an unknown step (accepted: present,",
+        ),
+        (MOTION[1:], "motion of snatch: line_in, switch, line_out: are not the steps of a motion"),
+        ((home(g), *MOTION), "home, transit, line_in, switch, line_out: are not the steps"),
+        ((MOTION[0], line_in(g), *MOTION[2:]), "motion of snatch: line_in: has no direction"),
+        ((MOTION[0], line_in(g, left=0.1), *MOTION[2:]), "accepted: one of back, down, up with a"),
+    ],
+)
+def test_a_motion_that_cannot_be_carried_out_is_refused(
+    motion: tuple[Term, ...], message: str
+) -> None:
+    with pytest.raises(InputError) as refused:
+        check_motions(domain(*motion))
+    assert message in str(refused.value)
+    assert "\n" not in str(refused.value)
