@@ -54,6 +54,27 @@ def rotation_matrix(quaternion: Array) -> Array:
     return np.stack([rotate(quaternion, axis) for axis in np.eye(3)], axis=-1)
 
 
+def quaternion(rotation: Array) -> Array:
+    """Unit quaternion (4,) of a rotation matrix (3, 3).
+
+    Four times the products of its components stand in the matrix; the row of the largest component
+    is divided by it.
+    """
+    r, (x, y, z) = rotation, np.diag(rotation)
+    a, b, c = r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]
+    d, e, f = r[1, 0] + r[0, 1], r[2, 0] + r[0, 2], r[2, 1] + r[1, 2]
+    products = np.array(
+        [
+            [1 + x - y - z, d, e, a],
+            [d, 1 - x + y - z, f, b],
+            [e, f, 1 - x - y + z, c],
+            [a, b, c, 1 + x + y + z],
+        ]
+    )
+    largest = int(np.argmax(np.diag(products)))
+    return np.asarray(products[largest] / (2 * np.sqrt(products[largest, largest])))
+
+
 def yaw_of(transform: Array) -> Array:
     """Heading (rad) of the body's x axis, seen from above."""
     x_axis = rotate(transform[..., 3:], np.array([1.0, 0.0, 0.0]))

@@ -9,7 +9,7 @@ from guided_lgp.bounds.results import CoarseResult
 from guided_lgp.bounds.verify import verify_keyframes
 from guided_lgp.logic import Skeleton, applicable_actions, parse_skeleton, progress, successor
 from guided_lgp.poses import tilt
-from guided_lgp.scene import Box, Robot, Scene, Table, generate, pr2
+from guided_lgp.scene import Box, PlacedRobot, Scene, Table, generate, pr2
 from guided_lgp.scene.setups import SETUPS
 from guided_lgp.scene.world import World
 
@@ -181,7 +181,7 @@ def test_verdicts_do_not_depend_on_where_the_robot_stands(bound: CoarseBound) ->
 
     turn = np.pi / 2
     scene = Scene(
-        robot=Robot(base=(1.0, 2.0, turn)),
+        robot=PlacedRobot(base=(1.0, 2.0, turn)),
         tables=tuple(
             t.model_copy(update={"position": (*moved(*t.position[:2]), t.position[2]), "yaw": turn})
             for t in SCENE.tables

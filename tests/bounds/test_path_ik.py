@@ -4,11 +4,11 @@ from motions import scene
 
 from guided_lgp.bounds.path.ik import Arm, continuous_near, unwrapped
 from guided_lgp.poses import rotation_matrix
-from guided_lgp.scene import GRIPPERS, Robot
+from guided_lgp.scene import GRIPPERS, PlacedRobot
 from guided_lgp.scene.pr2 import CONTINUOUS, HOME_CONFIGURATION, JOINT_LIMITS, arm_slice, tool_pose
 
 TURNED = scene(red=(0.5, 0.3, 0.65, 0.0, "tab1")).model_copy(
-    update={"robot": Robot(base=(0.1, -0.2, 0.3), torso=0.2)}
+    update={"robot": PlacedRobot(base=(0.1, -0.2, 0.3), torso=0.2)}
 )
 
 

@@ -7,7 +7,17 @@ import numpy as np
 import pytest
 
 from guided_lgp.errors import InputError
-from guided_lgp.poses import Array, apply, compose, inverse, pose, tilt, yaw_of
+from guided_lgp.poses import (
+    Array,
+    apply,
+    compose,
+    inverse,
+    pose,
+    quaternion,
+    rotation_matrix,
+    tilt,
+    yaw_of,
+)
 from guided_lgp.scene import GRIPPERS, Scene, Table, generate, pr2
 from guided_lgp.scene.reach import grasp_poses, solve_arm
 from guided_lgp.scene.world import World
@@ -165,3 +175,12 @@ def test_poses() -> None:
     batch = np.stack([first, second])
     assert compose(first, batch)[1] == pytest.approx(compose(first, second))
     assert angle_between(first, second) == pytest.approx(1.4)
+
+
+def test_quaternion_of_a_rotation() -> None:
+    rng = np.random.default_rng(2)
+    turns = [*np.eye(4), *rng.normal(size=(50, 4))]
+    for turn in (q / np.linalg.norm(q) for q in turns):
+        found = quaternion(rotation_matrix(turn))
+        assert abs(found @ turn) == pytest.approx(1.0)
+    assert quaternion(np.eye(3)).tolist() == [0, 0, 0, 1]

@@ -180,8 +180,8 @@ def _sources() -> str:
     """Digest of the code that a verdict depends on."""
     package = Path(guided_lgp.__file__).parent
     digest = sha256()
-    for part in ("logic", "scene", "bounds", "search", "experiments"):
+    for part in ("logic", "robots", "scene", "bounds", "search", "experiments"):
         for path in sorted((package / part).rglob("*")):
-            if path.suffix in {".py", ".c", ".h"}:
+            if path.suffix in {".py", ".yaml", ".c", ".h"}:
                 digest.update(path.read_bytes())
     return digest.hexdigest()

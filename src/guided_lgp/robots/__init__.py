@@ -1,1 +1,6 @@
-"""What is derived from a robot's description."""
+"""Robots: one file each, and what is derived from their descriptions."""
+
+from guided_lgp.robots.registry import load_robot, robot_names
+from guided_lgp.robots.robot import Arm, Fingers, Robot
+
+__all__ = ["Arm", "Fingers", "Robot", "load_robot", "robot_names"]

@@ -1,13 +1,13 @@
-"""Scenes, their generation, the PR2 and the PyBullet world."""
+"""Scenes, their generation and their PyBullet world."""
 
 from guided_lgp.scene.generate import GeneratedScenes, generate, load_scenes
-from guided_lgp.scene.model import GRIPPERS, Box, Robot, Scene, Table, load_scene, parse_scene
+from guided_lgp.scene.model import GRIPPERS, Box, PlacedRobot, Scene, Table, load_scene, parse_scene
 
 __all__ = [
     "GRIPPERS",
     "Box",
     "GeneratedScenes",
-    "Robot",
+    "PlacedRobot",
     "Scene",
     "Table",
     "generate",

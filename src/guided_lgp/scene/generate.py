@@ -11,7 +11,7 @@ from guided_lgp.documents import read_json, write_json
 from guided_lgp.errors import InputError
 from guided_lgp.scene.footprints import footprint, gap, inset
 from guided_lgp.scene.model import Box, Scene, Table, parse_scene
-from guided_lgp.scene.setups import CLEARANCE, ROBOT, SETUPS, Setup
+from guided_lgp.scene.setups import CLEARANCE, SETUPS, Setup
 
 _VERSION = 1
 _MAX_DRAWS = 10_000
@@ -109,7 +109,7 @@ def _draw_accepted(
         boxes = _draw_on_slots(setup, rng) if setup.slots else _draw_anywhere(setup, rng)
         if boxes is None:
             continue
-        scene = Scene(name=name, robot=ROBOT, tables=setup.tables, boxes=boxes)
+        scene = Scene(name=name, tables=setup.tables, boxes=boxes)
         if accept(scene):
             return scene, rejected
         rejected += 1

@@ -1,15 +1,19 @@
 """The scene document: robot, tables and boxes (DESIGN §3)."""
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from guided_lgp.documents import read_json
 from guided_lgp.domains import load_domain
 from guided_lgp.errors import InputError
 from guided_lgp.logic import State, Symbols
+from guided_lgp.poses import Array, compose, pose
+from guided_lgp.robots import Robot, load_robot
 
 GRIPPERS = ("pr2L", "pr2R")
 
@@ -24,12 +28,86 @@ class _Document(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-class Robot(_Document):
-    """The PR2 with a fixed base (m, in the plane) and torso (m)."""
+class PlacedRobot(BaseModel):
+    """A robot whose base stands still.
 
-    model: Literal["pr2"] = "pr2"
+    Beside ``model`` and ``base`` the document has one number for each joint that the robot keeps
+    fixed, by the name that the robot file gives it: ``torso`` (m) for the PR2.
+    """
+
+    model_config = ConfigDict(extra="allow", frozen=True)
+    __pydantic_extra__: dict[str, Coordinate] = Field(init=False)  # for type checkers only
+
+    model: str = "pr2"
+    """A robot by its name, or the path of a robot file."""
     base: tuple[Coordinate, Coordinate, Coordinate] = (0.0, 0.0, 0.0)
-    torso: Annotated[float, Field(strict=True, ge=0.0115, le=0.325)] = 0.28
+    """x and y (m) and yaw (rad) of the base link on the floor."""
+
+    @property
+    def description(self) -> Robot:
+        """The robot itself."""
+        return load_robot(self.model)
+
+    @property
+    def base_pose(self) -> Array:
+        """Pose (7,) of the base link in the world."""
+        x, y, yaw = self.base
+        return pose((x, y, 0.0), yaw)
+
+    @property
+    def fixed_values(self) -> dict[str, float]:
+        """Values (rad, or m) of the joints that stay as they are, by the joint's name."""
+        joints = self.description.fixed_joints
+        return {fixed.joint: self.__pydantic_extra__[name] for name, fixed in joints.items()}
+
+    @property
+    def torso(self) -> float:
+        """Height (m) of the PR2's torso."""
+        return self.__pydantic_extra__["torso"]
+
+    def link_pose(self, q: Array, link: str) -> Array:
+        """Pose (7,) of a link's frame in the world (forward kinematics by pinocchio).
+
+        Args:
+            q: configuration (n,) in rad.
+            link: name in the URDF; the fingers are at zero.
+        """
+        return np.asarray(self.link_poses(np.asarray(q)[None], (link,))[0, 0])
+
+    def link_poses(self, q: Array, links: Sequence[str]) -> Array:
+        """Poses (T, len(links), 7) of links along a motion q (T, n); see :meth:`link_pose`."""
+        kinematics = self.description.kinematics
+        return compose(self.base_pose, kinematics.link_poses(q, self.fixed_values, links))
+
+    def tool_pose(self, q: Array, gripper: str) -> Array:
+        """Pose (7,) of a gripper's tool frame in the world at a configuration q (n,)."""
+        return np.asarray(self.tool_poses(np.asarray(q)[None], (gripper,))[gripper][0])
+
+    def tool_poses(self, q: Array, grippers: Sequence[str] | None = None) -> dict[str, Array]:
+        """Poses (T, 7) of tool frames, by default of all, along a motion q (T, n), by gripper."""
+        arms = self.description.arms
+        wanted = tuple(arms) if grippers is None else grippers
+        poses = self.link_poses(q, [arms[gripper].tool_link for gripper in wanted])
+        return {
+            gripper: compose(poses[:, column], arms[gripper].tool_in_link)
+            for column, gripper in enumerate(wanted)
+        }
+
+    @model_validator(mode="before")
+    @classmethod
+    def _all_fixed_joints(cls, data: Any) -> Any:
+        """Fill in the joints that the document leaves out; refuse fields that are none."""
+        if not isinstance(data, dict) or not isinstance(data.get("model", "pr2"), str):
+            return data
+        defaults = {
+            name: fixed.default
+            for name, fixed in load_robot(data.get("model", "pr2")).fixed_joints.items()
+        }
+        accepted = ("model", "base", *defaults)
+        for field in data:
+            if field not in accepted:
+                raise ValueError(f"unknown field {field!r} ({', '.join(accepted)})")
+        return data | {name: data.get(name, value) for name, value in defaults.items()}
 
 
 class Table(_Document):
@@ -55,7 +133,7 @@ class Scene(_Document):
     """An initial configuration x_0 with its symbols."""
 
     name: str = "scene"
-    robot: Robot = Robot()
+    robot: PlacedRobot = Field(default_factory=PlacedRobot)
     tables: Annotated[tuple[Table, ...], Field(min_length=1)]
     boxes: Annotated[tuple[Box, ...], Field(min_length=1)]
 
@@ -63,7 +141,7 @@ class Scene(_Document):
     def symbols(self) -> Symbols:
         """The symbols of the scene by logic type, as declared."""
         return load_domain().symbols(
-            gripper=GRIPPERS,
+            gripper=self.robot.description.grippers,
             box=(box.name for box in self.boxes),
             table=(table.name for table in self.tables),
         )
@@ -75,12 +153,13 @@ class Scene(_Document):
 
     @model_validator(mode="after")
     def _names(self) -> "Scene":
-        names = [*GRIPPERS, *(t.name for t in self.tables), *(b.name for b in self.boxes)]
+        grippers = self.robot.description.grippers
+        names = [*grippers, *(t.name for t in self.tables), *(b.name for b in self.boxes)]
         for name in names:
             if names.count(name) > 1:
                 raise ValueError(f"name {name!r} is used twice")
         for box in self.boxes:
-            if box.on not in names or box.on in GRIPPERS or box.on == box.name:
+            if box.on not in names or box.on in grippers or box.on == box.name:
                 raise ValueError(f"box {box.name!r} stands on unknown table {box.on!r}")
         return self
 

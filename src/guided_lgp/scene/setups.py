@@ -6,9 +6,7 @@ configuration while a good part of the action sequences cannot be carried out (D
 
 from dataclasses import dataclass
 
-from guided_lgp.scene.model import Robot, Table
-
-ROBOT = Robot(base=(0.0, 0.0, 0.0), torso=0.28)
+from guided_lgp.scene.model import Table
 
 BOX_SIZE = (0.15, 0.07, 0.10)
 """Extents (m). The fingers close across the 7 cm; on a 12 cm high box no two others could stand."""

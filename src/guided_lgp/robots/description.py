@@ -1,0 +1,287 @@
+"""A robot's description: its URDF and SRDF, found and made ready for PyBullet and pinocchio."""
+
+import os
+import tempfile
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from functools import cached_property
+from hashlib import sha256
+from importlib.metadata import PackageNotFoundError, files
+from pathlib import Path
+
+import numpy as np
+
+from guided_lgp.errors import InputError
+from guided_lgp.paths import DESCRIPTIONS
+from guided_lgp.robots.document import DescriptionFiles
+
+_STL_FACET = np.dtype([("normal", "<f4", 3), ("vertices", "<f4", (3, 3)), ("attribute", "<u2")])
+_STL_HEADER = 84
+_PACKAGE = "package://"
+
+
+@dataclass(frozen=True)
+class JointDescription:
+    """A joint that can move, as the URDF has it: rad, or m where it slides."""
+
+    limits: tuple[float, float] | None
+    """None where the joint turns without end."""
+    velocity: float
+    mimic: float
+    """Factor to the joint that it follows; 1 if it follows none."""
+
+
+@dataclass(frozen=True)
+class Description:
+    """URDF and SRDF of a robot."""
+
+    where: str
+    """The robot file, for messages."""
+    source: Path
+    """The URDF as it was shipped."""
+    srdf: Path | None
+    packages: Mapping[str, Path]
+    """Folders for ``package://NAME``; others are looked for above the URDF."""
+
+    @cached_property
+    def _root(self) -> ET.Element:
+        try:
+            return ET.parse(self.source).getroot()
+        except (OSError, ET.ParseError) as error:
+            raise InputError(f"{self.where}: description.urdf", str(error), "a URDF") from None
+
+    @cached_property
+    def links(self) -> tuple[str, ...]:
+        """All links."""
+        return tuple(link.get("name", "") for link in self._root.findall("link"))
+
+    @cached_property
+    def parents(self) -> dict[str, str]:
+        """The link that each link but the root hangs on."""
+        return {
+            _link(joint, "child"): _link(joint, "parent") for joint in self._root.findall("joint")
+        }
+
+    @cached_property
+    def children(self) -> dict[str, str]:
+        """The link that each joint carries."""
+        joints = self._root.findall("joint")
+        return {joint.get("name", ""): _link(joint, "child") for joint in joints}
+
+    @cached_property
+    def joints(self) -> dict[str, JointDescription]:
+        """The joints that can move, by name."""
+        kinds = {"revolute", "continuous", "prismatic"}
+        found = (joint for joint in self._root.findall("joint") if joint.get("type") in kinds)
+        return {joint.get("name", ""): self._joint(joint) for joint in found}
+
+    @cached_property
+    def solid_links(self) -> tuple[str, ...]:
+        """Links with collision geometry, each after the link that it hangs on."""
+        solid = {
+            link.get("name", "")
+            for link in self._root.findall("link")
+            if link.find("collision") is not None
+        }
+        (root,) = (link for link in self.links if link not in self.parents)
+        return tuple(link for link in self._below(root) if link in solid)
+
+    @cached_property
+    def urdf(self) -> Path:
+        """The URDF, ready for PyBullet and pinocchio.
+
+        A copy in the user's cache folder (``$XDG_CACHE_HOME/guided-lgp``): meshes have the path of
+        the installed files; pure frames, which have no inertia, get a mass of 1 g, where PyBullet
+        would assume 1 kg; and meshes without normals, which would be drawn black, are drawn from
+        repaired copies. Files are written once, atomically, under names that depend on their
+        content.
+        """
+        text = self.source.read_text(encoding="utf-8")
+        root = ET.fromstring(text)
+        (base,) = (link for link in self.links if link not in self.parents)
+        for mesh in root.iter("mesh"):
+            mesh.set("filename", str(self._resolved(mesh.get("filename", ""))))
+        for link in root.iter("link"):
+            if link.find("inertial") is None and link.get("name") != base:
+                inertial = ET.SubElement(link, "inertial")
+                ET.SubElement(inertial, "mass", value="0.001")
+                moments = {"ixx": "1e-6", "iyy": "1e-6", "izz": "1e-6"}
+                ET.SubElement(inertial, "inertia", moments | {"ixy": "0", "ixz": "0", "iyz": "0"})
+        for mesh in root.findall("link/visual/geometry/mesh"):
+            mesh.set("filename", str(_with_normals(Path(mesh.get("filename", "")))))
+        return _cached(self.source.stem, "urdf", ET.tostring(root))
+
+    @cached_property
+    def disabled_pairs(self) -> frozenset[frozenset[str]]:
+        """Pairs of links that are not checked for self-collision: those of the SRDF.
+
+        Raises:
+            InputError: the SRDF cannot be read, or names a link that the URDF does not have.
+        """
+        if self.srdf is None:
+            return frozenset()
+        where = f"{self.where}: description.srdf"
+        try:
+            root = ET.parse(self.srdf).getroot()
+        except (OSError, ET.ParseError) as error:
+            raise InputError(where, str(error), "an SRDF") from None
+        pairs = [
+            (pair.get("link1", ""), pair.get("link2", ""))
+            for pair in root.iter("disable_collisions")
+        ]
+        for link in (link for pair in pairs for link in pair if link not in self.links):
+            raise InputError(where, f"disables collisions of unknown link {link}", f"{self.source}")
+        return frozenset(map(frozenset, pairs))
+
+    def require_links(self, field: str, *links: str) -> None:
+        """Check that the URDF has some links.
+
+        Raises:
+            InputError: the first that it does not have.
+        """
+        for link in links:
+            if link not in self.links:
+                accepted = _similar(link, self.links)
+                raise InputError(f"{self.where}: {field}", f"unknown link {link}", accepted)
+
+    def require_joints(self, field: str, *joints: str) -> None:
+        """Check that the URDF has some joints, and that they can move.
+
+        Raises:
+            InputError: the first of which that is not so.
+        """
+        for joint in joints:
+            if joint not in self.joints:
+                accepted = _similar(joint, tuple(self.joints))
+                fault = f"{joint} is no joint that moves"
+                raise InputError(f"{self.where}: {field}", fault, accepted)
+
+    def solid_links_below(self, joint: str) -> tuple[str, ...]:
+        """Links with collision geometry that a joint moves."""
+        below = set(self._below(self.children[joint]))
+        return tuple(link for link in self.solid_links if link in below)
+
+    def _below(self, link: str) -> Iterator[str]:
+        """The link and all that hang on it."""
+        yield link
+        for child, parent in self.parents.items():
+            if parent == link:
+                yield from self._below(child)
+
+    def _joint(self, joint: ET.Element) -> JointDescription:
+        limit, mimic = joint.find("limit"), joint.find("mimic")
+        stated = {} if limit is None else limit.attrib
+        limits = None
+        if joint.get("type") != "continuous":
+            if not {"lower", "upper"} <= stated.keys():
+                raise InputError(str(self.source), f"joint {joint.get('name')} has no limits")
+            limits = float(stated["lower"]), float(stated["upper"])
+        return JointDescription(
+            limits,
+            float(stated.get("velocity", "inf")),
+            1.0 if mimic is None else float(mimic.get("multiplier", "1")),
+        )
+
+    def _resolved(self, name: str) -> Path:
+        """The file that a URDF means, relative to itself or to a package."""
+        if not name.startswith(_PACKAGE):
+            return (self.source.parent / name.removeprefix("file://")).resolve()
+        package, _, rest = name.removeprefix(_PACKAGE).partition("/")
+        if package in self.packages:
+            return self.packages[package] / rest
+        for folder in self.source.parents:
+            for candidate in (folder / package / rest, folder / rest):
+                if candidate.is_file():
+                    return candidate
+        where = f"{self.where}: description.packages"
+        raise InputError(where, f"{name} is not above {self.source}", f"{package}: its folder")
+
+
+def find_description(where: Path, stated: DescriptionFiles) -> Description:
+    """Find the files of a description.
+
+    Args:
+        where: the robot file.
+        stated: what it says about them.
+
+    Raises:
+        InputError: a package is not installed, or a file is missing.
+    """
+
+    def found(field: str, name: str) -> Path:
+        if stated.package is not None:
+            return _shipped(stated.package, name)
+        file = (where.parent / name).resolve()
+        if not file.is_file():
+            raise InputError(f"{where}: description.{field}", f"{file} is not a file")
+        return file
+
+    return Description(
+        where=str(where),
+        source=found("urdf", stated.urdf),
+        srdf=None if stated.srdf is None else found("srdf", stated.srdf),
+        packages={name: where.parent / folder for name, folder in stated.packages.items()},
+    )
+
+
+def _shipped(package: str, name: str) -> Path:
+    """A file that comes with this package, or of the installed one, by the end of its path."""
+    if (DESCRIPTIONS / name).is_file():
+        return DESCRIPTIONS / name
+    try:
+        recorded = files(package) or []
+    except PackageNotFoundError:
+        raise InputError(package, "is not installed", f"pip install {package}") from None
+    parts = Path(name).parts
+    for file in recorded:
+        if file.parts[-len(parts) :] == parts:
+            return Path(os.fspath(file.locate())).resolve()
+    raise InputError(package, f"has no {name}")
+
+
+def _link(joint: ET.Element, key: str) -> str:
+    element = joint.find(key)
+    return "" if element is None else element.get("link", "")
+
+
+def _similar(name: str, accepted: tuple[str, ...]) -> str:
+    """The most similar names, for a message."""
+    return ", ".join(get_close_matches(name, accepted, 3, 0.0))
+
+
+def _with_normals(mesh: Path) -> Path:
+    """The mesh, or a copy with its facets' normals filled in, if it is an STL without them."""
+    content = mesh.read_bytes() if mesh.suffix.lower() == ".stl" else b""
+    facets = _facets(content)
+    if facets is None or np.any(facets["normal"]):
+        return mesh
+    sides = np.diff(facets["vertices"].astype(float), axis=1)
+    normals = np.cross(sides[:, 0], sides[:, 1])
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    facets["normal"] = normals / np.maximum(lengths, 1e-12)
+    return _cached(mesh.stem, "stl", content[:_STL_HEADER] + facets.tobytes())
+
+
+def _facets(content: bytes) -> np.ndarray | None:
+    """The facets of a binary STL, which has their number; None for other files."""
+    count = int.from_bytes(content[_STL_HEADER - 4 : _STL_HEADER], "little")
+    if len(content) != _STL_HEADER + count * _STL_FACET.itemsize or not count:
+        return None
+    return np.frombuffer(content, _STL_FACET, offset=_STL_HEADER).copy()
+
+
+def _cached(name: str, suffix: str, content: bytes) -> Path:
+    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    target = Path(base) / "guided-lgp" / f"{name}-{sha256(content).hexdigest()[:16]}.{suffix}"
+    if not target.exists():
+        try:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            with tempfile.NamedTemporaryFile(dir=target.parent, delete=False) as file:
+                file.write(content)
+            Path(file.name).replace(target)
+        except OSError as error:
+            fault = error.strerror or "cannot be written"
+            raise InputError(str(target.parent), fault, "a writable $XDG_CACHE_HOME") from None
+    return target

@@ -1,0 +1,197 @@
+"""The robot file: what a robot's description does not say by itself.
+
+Lengths in m, angles in rad. ``<side>`` in a name stands for the arm's ``side``, so that an arm that
+mirrors another one has the same names but for that.
+"""
+
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from guided_lgp.errors import InputError
+
+Number = Annotated[float, Field(allow_inf_nan=False)]
+Length = Annotated[float, Field(gt=0, le=10, allow_inf_nan=False)]
+Names = Annotated[tuple[str, ...], Field(min_length=1)]
+SIDE = "<side>"
+Axis = Literal["x", "y", "z", "-x", "-y", "-z"]
+
+
+class _Document(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class DescriptionFiles(_Document):
+    """Where URDF and SRDF are."""
+
+    urdf: str
+    """In the package; without one, relative to the robot file."""
+    srdf: str | None = None
+    package: str | None = None
+    """An installed Python package that ships the files."""
+    packages: dict[str, str] = {}
+    """Folders for ``package://NAME`` in the URDF, where they are not above it."""
+
+
+class FixedJoint(_Document):
+    """A joint that keeps the value that the scene gives it."""
+
+    joint: str
+    limits: tuple[Number, Number]
+    default: Number
+
+
+class ToolDocument(_Document):
+    """The frame between the fingertips, in which objects are held."""
+
+    link: str
+    offset: tuple[Number, Number, Number] = (0.0, 0.0, 0.0)
+    """Of the frame's origin in the link."""
+    approach: Axis
+    """The link's axis that points out of the palm."""
+    closing: Axis
+    """The link's axis along which the fingers close."""
+    palm_front: Number
+    """Of the palm along the approach, from the frame's origin."""
+
+
+class GapDocument(_Document):
+    """Distance of the fingertips at a joint value a: ``sine sin a + cosine cos a + offset``."""
+
+    sine: Number
+    cosine: Number
+    offset: Number
+
+
+class FingersDocument(_Document):
+    """The joints that open a hand; all follow the first one, by the URDF's mimic factors."""
+
+    joints: tuple[str, ...]
+    gap: GapDocument
+    lever: Length
+    """How far a fingertip moves per rad (or m) of the joints."""
+    grasp_width: Length
+    """Widest side of an object that the fingers close across."""
+
+
+class SegmentsDocument(_Document):
+    """Links at the ends of the arm's segments, and how far those reach beyond their axes."""
+
+    ends: Names
+    radius: Length
+
+
+class ArmDocument(_Document):
+    """One arm with its hand."""
+
+    side: str = ""
+    mirrors: str | None = None
+    """The arm of which this one is the mirror image at the plane y = 0 of the base. All else is
+    that arm's, its names with the own side; values are the mirrored arm's."""
+    signs: tuple[Literal[-1, 1], ...] = ()
+    """They turn joint values of one arm into the mirror image with the other."""
+    joints: Names
+    home: tuple[Number, ...]
+    redundant: str | None = None
+    """The joint that parametrises the inverse kinematics of an arm with seven."""
+    tool: ToolDocument
+    hand_links: Names
+    """The palm first."""
+    hand_radius: Length
+    """Reach of the open hand beyond its tool frame, sideways."""
+    segments: SegmentsDocument
+    fingers: FingersDocument
+    lever_arms: tuple[Number, ...]
+    """How far each joint moves the tool frame per rad, at most."""
+    reaches: tuple[Number, ...]
+    """How far each joint moves a point of hand or held box per rad; the metric of paths."""
+    spheres: dict[str, tuple[tuple[Number, Number, Number, Length], ...]]
+    """By link: centre in the link's frame, and radius."""
+    spheres_between_arms: tuple[int, ...] = ()
+    """Which of them stand for the arm against another arm."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _own_names(cls, data: Any) -> Any:
+        side = data.get("side", "") if isinstance(data, dict) else ""
+        return _replaced(data, SIDE, side) if isinstance(side, str) else data
+
+    @model_validator(mode="after")
+    def _one_value_per_joint(self) -> Self:
+        mirrored = ("signs",) if self.mirrors is not None else ()
+        for field in ("home", "lever_arms", "reaches", *mirrored):
+            count = len(getattr(self, field))
+            if count != len(self.joints):
+                raise ValueError(f"{field} has {count} values for {len(self.joints)} joints")
+        if self.redundant is not None and self.redundant not in self.joints:
+            accepted = ", ".join(self.joints)
+            raise ValueError(f"redundant {self.redundant} is no joint of the arm ({accepted})")
+        return self
+
+
+class RobotDocument(_Document):
+    """The whole file."""
+
+    description: DescriptionFiles
+    base_link: str
+    """The link that a scene's ``robot.base`` places: the root of the URDF."""
+    fixed_joints: dict[str, FixedJoint] = {}
+    acceleration: Length
+    """Limits of acceleration over those of velocity (1/s)."""
+    arms: Annotated[dict[str, ArmDocument], Field(min_length=1)]
+    """By name of the gripper, in the order of a configuration."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _mirrored_arms(cls, data: Any) -> Any:
+        arms = data.get("arms") if isinstance(data, dict) else None
+        if not isinstance(arms, dict):
+            return data
+        return data | {"arms": {name: _whole(name, arm, arms) for name, arm in arms.items()}}
+
+
+def read_document(file: Path) -> RobotDocument:
+    """Read and validate a robot file.
+
+    Raises:
+        InputError: the first fault, with file and field.
+    """
+    try:
+        data = yaml.safe_load(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(str(file), error.strerror or "cannot be read", "a robot file") from None
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise InputError(str(file), f"is not YAML: {' '.join(str(error).split())}") from None
+    try:
+        return RobotDocument.model_validate(data)
+    except ValidationError as error:
+        first = error.errors()[0]
+        field = ".".join(str(part) for part in first["loc"])
+        raise InputError(f"{file}: {field}" if field else str(file), first["msg"]) from None
+
+
+def _whole(name: str, arm: Any, arms: dict[str, Any]) -> Any:
+    """An arm with what it takes over from the one that it mirrors."""
+    if not isinstance(arm, dict) or "mirrors" not in arm:
+        return arm
+    if arm["mirrors"] not in arms or arm["mirrors"] == name:
+        accepted = ", ".join(other for other in arms if other != name)
+        raise ValueError(f"{name} mirrors unknown arm {arm['mirrors']} ({accepted})")
+    own = arm.keys() - {"side", "mirrors", "signs"}
+    if own:
+        raise ValueError(f"{name} mirrors an arm and has {min(own)} (side, mirrors, signs)")
+    original = arms[arm["mirrors"]]
+    return original | arm if isinstance(original, dict) else arm
+
+
+def _replaced(data: Any, old: str, new: str) -> Any:
+    """The data with a text replaced in all strings."""
+    if isinstance(data, str):
+        return data.replace(old, new)
+    if isinstance(data, dict):
+        return {_replaced(k, old, new): _replaced(v, old, new) for k, v in data.items()}
+    if isinstance(data, list):
+        return [_replaced(item, old, new) for item in data]
+    return data

@@ -1,0 +1,210 @@
+"""A robot as the planner sees it: arms with hands, their joints, limits and measures."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from guided_lgp.poses import Array
+from guided_lgp.robots.description import Description
+from guided_lgp.robots.document import FixedJoint
+from guided_lgp.robots.kinematics import Kinematics
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Distance of two fingertips that turn together: ``sine sin a + cosine cos a + offset`` (m)."""
+
+    sine: float
+    cosine: float
+    offset: float
+
+    def gap(self, value: float) -> float:
+        """Distance (m) at a joint value (rad)."""
+        return float(self.sine * np.sin(value) + self.cosine * np.cos(value) + self.offset)
+
+    def value(self, gap: float) -> float:
+        """Joint value (rad) at a distance (m)."""
+        amplitude = np.hypot(self.sine, self.cosine)
+        sine = np.clip((gap - self.offset) / amplitude, -1.0, 1.0)
+        return float(np.arcsin(sine) - np.arctan2(self.cosine, self.sine))
+
+
+@dataclass(frozen=True, eq=False)
+class Fingers:
+    """The joints that open a hand. All follow one value (rad or m)."""
+
+    joints: tuple[str, ...]
+    ratios: Array
+    """(n,) what each joint makes of the value: a factor."""
+    slice: slice
+    """Where they stand in the moving joints of the robot."""
+    lower: float
+    upper: float
+    velocity: float
+    """Limit (rad/s or m/s)."""
+    lever: float
+    """How far (m) a fingertip moves at most per unit of the value."""
+    grasp_width: float
+    """Widest side (m) of an object that they close across."""
+    gap: Gap
+
+    def opening(self, value: float) -> float:
+        """Distance (m) between the fingertips at a value."""
+        return self.gap.gap(value)
+
+    def value(self, opening: float) -> float:
+        """The value, within the limits, that opens the fingers so far (m)."""
+        return float(np.clip(self.gap.value(opening), self.lower, self.upper))
+
+    @cached_property
+    def opened(self) -> float:
+        """The value at which they are widest open."""
+        return max(self.lower, self.upper, key=self.opening)
+
+    @cached_property
+    def closed(self) -> float:
+        """The value at which they are closed."""
+        return min(self.lower, self.upper, key=self.opening)
+
+    @cached_property
+    def widest(self) -> float:
+        """Widest distance (m) of the fingertips."""
+        return self.opening(self.opened)
+
+
+@dataclass(frozen=True)
+class Sphere:
+    """A sphere that covers part of a link: centre in the link's frame and radius (m)."""
+
+    link: str
+    centre: tuple[float, float, float]
+    radius: float
+
+
+@dataclass(frozen=True, eq=False)
+class Arm:
+    """One arm with its hand. Arrays have one row per joint, from shoulder to wrist."""
+
+    gripper: str
+    joints: tuple[str, ...]
+    slice: slice
+    """Where they stand in a configuration of the robot."""
+    home: Array
+    """(n,) rad: the posture at the arm's side, out of the other arms' way."""
+    limits: Array
+    """(n, 2) rad. A joint that turns without end has two turns, so that a configuration stays a
+    vector of plain numbers."""
+    velocity_limits: Array
+    """(n,) rad/s."""
+    acceleration_limits: Array
+    """(n,) rad/s^2."""
+    redundant: int | None
+    """Index of the joint that parametrises the inverse kinematics, if the arm has one too many."""
+    mirror_of: str | None
+    """The gripper of the arm of which this one is the mirror image, at the base's plane y = 0."""
+    signs: Array
+    """(n,) turn joint values of one arm into the mirror image with the other; ones if none."""
+    tool_link: str
+    tool_in_link: Array
+    """(7,) of the tool frame in its link: x points out of the palm, the fingers close along y."""
+    palm_front: float
+    """x of the palm's front in the tool frame (m)."""
+    links: tuple[str, ...]
+    """Links with collision geometry that the arm moves, the hand left out."""
+    hand_links: tuple[str, ...]
+    """Palm, then fingers: the links that may touch the held object."""
+    hand_radius: float
+    """Reach (m) of the open hand beyond the tool frame's origin, sideways."""
+    segment_ends: tuple[str, ...]
+    """Links at the ends of the arm's segments; the hand's end is the tool frame."""
+    segment_radius: float
+    """Reach (m) of the segments beyond their axes."""
+    lever_arms: Array
+    """(n,) m. Longest distance from each joint's axis to the tool frame, over all configurations:
+    a joint that turns by an angle moves the tool by at most its lever times the angle."""
+    reaches: Array
+    """(n,) m per rad: how far a point of hand or held object moves; the metric of paths."""
+    spheres: tuple[Sphere, ...]
+    """Cover arm and open hand."""
+    spheres_between_arms: tuple[int, ...]
+    """Indices of those that stand for the arm against another arm."""
+    fingers: Fingers
+
+
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """A robot. Configurations ``q`` (n,) are the joints of all arms, in the order of the arms."""
+
+    name: str
+    description: Description
+    base_link: str
+    """The root of the URDF, which a scene places."""
+    fixed_joints: Mapping[str, FixedJoint]
+    """Joints that keep the value that the scene gives them, by their name in the scene."""
+    arms: Mapping[str, Arm]
+    """By gripper."""
+
+    @property
+    def urdf(self) -> Path:
+        """The description, ready for PyBullet and pinocchio."""
+        return self.description.urdf
+
+    @property
+    def disabled_pairs(self) -> frozenset[frozenset[str]]:
+        """Pairs of links that are not checked for self-collision."""
+        return self.description.disabled_pairs
+
+    @cached_property
+    def grippers(self) -> tuple[str, ...]:
+        """Names of the hands, which are the symbols of the logic."""
+        return tuple(self.arms)
+
+    @cached_property
+    def joint_names(self) -> tuple[str, ...]:
+        """The joints (n,) of a configuration q."""
+        return tuple(joint for arm in self.arms.values() for joint in arm.joints)
+
+    @cached_property
+    def moving_joints(self) -> tuple[str, ...]:
+        """Every joint that moves: the arms', then the fingers of all hands."""
+        fingers = (joint for arm in self.arms.values() for joint in arm.fingers.joints)
+        return (*self.joint_names, *fingers)
+
+    @cached_property
+    def home(self) -> Array:
+        """(n,) rad: all arms at their side."""
+        return np.concatenate([arm.home for arm in self.arms.values()])
+
+    @cached_property
+    def position_limits(self) -> Array:
+        """(n, 2) rad."""
+        return np.concatenate([arm.limits for arm in self.arms.values()])
+
+    @cached_property
+    def velocity_limits(self) -> Array:
+        """(n,) rad/s."""
+        return np.concatenate([arm.velocity_limits for arm in self.arms.values()])
+
+    @cached_property
+    def acceleration_limits(self) -> Array:
+        """(n,) rad/s^2."""
+        return np.concatenate([arm.acceleration_limits for arm in self.arms.values()])
+
+    @cached_property
+    def lever_arms(self) -> Array:
+        """(n,) m; see :attr:`Arm.lever_arms`."""
+        return np.concatenate([arm.lever_arms for arm in self.arms.values()])
+
+    @cached_property
+    def continuous(self) -> tuple[int, ...]:
+        """Indices into a configuration of the joints that turn without end."""
+        joints = self.description.joints
+        return tuple(i for i, name in enumerate(self.joint_names) if joints[name].limits is None)
+
+    @cached_property
+    def kinematics(self) -> Kinematics:
+        """Forward kinematics of the whole robot."""
+        return Kinematics(self.urdf, self.joint_names)
