@@ -34,11 +34,11 @@ _HANDS = {
 
 def below(arm: ArmDescription) -> list[str]:
     """Links with collision geometry that the arm's first joint moves."""
-    joints = read_joints(arm.urdf)
+    joints, first = read_joints(arm.urdf), arm.joints[0]
     found = []
     for link in link_hulls(arm.urdf):
         above = link
-        while above in joints and joints[above].name != arm.joints[0]:
+        while above in joints and joints[above].name != first:
             above = joints[above].parent
         if above in joints:
             found.append(link)

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import pinocchio as pin
 
 from guided_lgp.errors import InputError
 from guided_lgp.robots.chain import Array
@@ -100,6 +99,8 @@ class _Hand:
         links: Sequence[str],
         fingers: Mapping[str, float],
     ) -> None:
+        import pinocchio as pin  # heavy: only where a robot is measured
+
         self._model = pin.buildModelFromUrdf(str(urdf))
         self._data = self._model.createData()
         self._tool = self._model.getFrameId(tool[0]), pin.SE3(tool[1], tool[2])
@@ -115,6 +116,8 @@ class _Hand:
 
     def shapes(self, value: float) -> list[Array]:
         """Vertices of all shapes in the tool frame, at a value of the finger joints."""
+        import pinocchio as pin
+
         q = pin.neutral(self._model)
         for index, factor in self._fingers.items():
             q[index] = factor * value

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from guided_lgp.robots.chain import Array, Chain, Joint, path_between, read_chain, read_joints
 from guided_lgp.robots.hand import HandShape, measure_hand
@@ -108,8 +108,10 @@ class ArmMeasures:
             spheres.setdefault(above, []).extend(tuple(row) for row in rows.tolist())
         return {link: tuple(rows) for link, rows in spheres.items()}
 
-    def _frames(self) -> dict[str, pin.SE3]:
+    def _frames(self) -> dict[str, Any]:
         """Where the links are with all joints at zero and the hand open."""
+        import pinocchio as pin  # heavy: only where a robot is measured
+
         model = pin.buildModelFromUrdf(str(self.urdf))
         data, q = model.createData(), pin.neutral(model)
         for joint, ratio in self.fingers.items():
