@@ -18,10 +18,12 @@ import numpy as np
 
 from guided_lgp import parallel
 from guided_lgp.bounds.coarse import CoarseBound
-from guided_lgp.bounds.coarse.formulation import Formulator, Margins, SceneGeometry
+from guided_lgp.bounds.coarse.formulation import Formulator
 from guided_lgp.bounds.coarse.ipopt import Ipopt
-from guided_lgp.bounds.coarse.solver import Program, Settings, Solution, default_solver
+from guided_lgp.bounds.coarse.solver import Settings, Solution, default_solver
 from guided_lgp.bounds.coarse.starts import Starts
+from guided_lgp.bounds.program.arrays import Program
+from guided_lgp.bounds.program.geometry import Margins, SceneGeometry
 from guided_lgp.bounds.results import Array, CoarseResult
 from guided_lgp.logic import Skeleton, applicable_actions, successor
 from guided_lgp.params import load_params
@@ -120,8 +122,8 @@ def _one_start(sequence: Sequence) -> float:
     starts = Starts(geometry, default_solver())
     began = time.process_time()
     formulation = Formulator(geometry, Margins()).build(sequence.result.skeleton)
-    known = getattr(sequence.prefix, "values", None)
-    start = starts.draw(formulation, np.random.default_rng(0), 0.0, known)
+    warm_start = getattr(sequence.prefix, "values", None)
+    start = starts.draw(formulation, np.random.default_rng(0), 0.0, warm_start)
     default_solver().solve(formulation.program, start, Settings())
     return time.process_time() - began
 

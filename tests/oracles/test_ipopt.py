@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from guided_lgp.bounds.coarse import CoarseBound
-from guided_lgp.bounds.coarse.formulation import Formulation, Formulator, Margins, SceneGeometry
+from guided_lgp.bounds.coarse.formulation import Formulation, Formulator
 from guided_lgp.bounds.coarse.ipopt import Ipopt
 from guided_lgp.bounds.coarse.solver import Settings, Solution, default_solver
 from guided_lgp.bounds.coarse.starts import Starts
+from guided_lgp.bounds.program.geometry import Margins, SceneGeometry
 from guided_lgp.logic import parse_skeleton
 from guided_lgp.scene import Box, Scene, Table
 

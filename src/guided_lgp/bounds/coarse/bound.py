@@ -8,23 +8,18 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from guided_lgp.bounds.coarse.formulation import (
-    GRASPABLE,
-    SIDES,
-    Formulation,
-    Formulator,
-    Level,
-    Margins,
-    Mode,
-    SceneGeometry,
-    Snapshot,
-    UngraspableError,
-    sphere_link,
-)
-from guided_lgp.bounds.coarse.kernels import PALM_GAP, SCALE, kernels
+from guided_lgp.bounds.coarse.formulation import Formulation, Formulator
 from guided_lgp.bounds.coarse.solver import Settings, Solution, Solver, default_solver
 from guided_lgp.bounds.coarse.starts import Starts
+from guided_lgp.bounds.program.draft import pose_values
+from guided_lgp.bounds.program.geometry import Margins, SceneGeometry
+from guided_lgp.bounds.program.kernels import SCALE
+from guided_lgp.bounds.program.kinematics import robot_kinematics
+from guided_lgp.bounds.program.slots import HeldBox, KeyframeSlots, PlanarPose
 from guided_lgp.bounds.results import Array, CoarseResult, Failure, Keyframe
+from guided_lgp.bounds.terms import kernel_table
+from guided_lgp.bounds.terms.hold import PALM_GAP
+from guided_lgp.bounds.terms.term import UngraspableError
 from guided_lgp.bounds.verify import verify_keyframes
 from guided_lgp.logic import Skeleton, format_skeleton
 from guided_lgp.poses import compose, multiply, pose
@@ -52,6 +47,7 @@ class CoarseBound:
         self.scene = scene
         self._restarts = restarts
         self._solver = solver or default_solver()
+        self._robot = robot_kinematics()
         self._geometry = SceneGeometry(scene)
         self._starts = Starts(self._geometry, self._solver)
         self._settings = Settings()
@@ -88,9 +84,9 @@ class CoarseBound:
         """Up to ``count`` further verified solutions from independent starts."""
         programs = _Programs(self._geometry, skeleton)
         found = 0
-        for attempt in range(self._restarts, self._restarts + 3 * count):
+        for number in range(self._restarts, self._restarts + 3 * count):
             try:
-                result = self._attempt(programs, attempt, None)
+                result = self._restart(programs, number, None)
             except UngraspableError:
                 return
             if result.feasible:
@@ -103,13 +99,11 @@ class CoarseBound:
         """Start after start until one leads to a verified solution."""
         programs = _Programs(self._geometry, skeleton)
         failures: list[Failure] = []
-        for attempt in range(self._restarts):
+        for number in range(self._restarts):
             try:
-                result = self._attempt(programs, attempt, prefix)
+                result = self._restart(programs, number, prefix)
             except UngraspableError as error:
-                failure = Failure(
-                    error.action, f"width of {error.box}", error.width - GRASPABLE, "both sides"
-                )
+                failure = Failure(error.action, f"width of {error.box}", error.excess, "both sides")
                 return CoarseSolution(skeleton, feasible=False, failure=failure, restarts=0)
             if result.feasible:
                 return result
@@ -120,22 +114,24 @@ class CoarseBound:
         failure = replace(failure, tried=f"{self._restarts} starts of the coarse bound")
         return CoarseSolution(skeleton, feasible=False, failure=failure, restarts=self._restarts)
 
-    def _attempt(
-        self, programs: "_Programs", attempt: int, prefix: CoarseSolution | None
+    def _restart(
+        self, programs: "_Programs", number: int, prefix: CoarseSolution | None
     ) -> CoarseSolution:
         """One start: the first and every other one keep the solution of the prefix."""
-        formulation = programs[attempt]
-        known = None if prefix is None else prefix.values
+        formulation = programs[number]
+        warm_start = None if prefix is None else prefix.values
         start = self._starts.draw(
             formulation,
-            _generator(programs.skeleton, attempt),
-            noise=0.0 if attempt == 0 else _NOISE,
-            known=known if attempt == 0 or attempt % 2 else None,
+            _generator(programs.skeleton, number),
+            noise=0.0 if number == 0 else _NOISE,
+            warm_start=warm_start if number == 0 or number % 2 else None,
         )
         solution = self._solver.solve(formulation.program, start, self._settings)
-        kept = known is not None and np.array_equal(solution.values[: len(known)], known)
+        kept = warm_start is not None and np.array_equal(
+            solution.values[: len(warm_start)], warm_start
+        )
         verified = len(programs.skeleton) - 1 if kept else 0
-        return self._check(programs.skeleton, formulation, solution, attempt + 1, verified)
+        return self._check(programs.skeleton, formulation, solution, number + 1, verified)
 
     def _check(
         self,
@@ -165,36 +161,38 @@ class CoarseBound:
         )
 
     def _keyframes(
-        self, formulation: Formulation, snapshots: Iterable[Snapshot], values: Array
+        self, formulation: Formulation, keyframes: Iterable[KeyframeSlots], values: Array
     ) -> tuple[Keyframe, ...]:
-        """Arms and boxes in the world at snapshots of the program."""
+        """Arms and boxes in the world at keyframes of the program."""
         poses: dict[int, Array] = {}
         frames = []
-        for snapshot in snapshots:
+        for slots in keyframes:
             q = pr2.HOME_CONFIGURATION.copy()
-            for gripper, joints in snapshot.joints.items():
+            for gripper, joints in slots.joints.items():
                 if joints is not None:
-                    arm = values[list(joints)]
-                    q[pr2.arm_slice(gripper)] = arm if SIDES[gripper] > 0 else pr2.MIRROR * arm
+                    signs = self._robot.arms[gripper].signs
+                    q[pr2.arm_slice(gripper)] = signs * values[list(joints)]
             boxes = {}
-            for name, where in snapshot.boxes.items():
+            for name, where in slots.boxes.items():
                 if id(where) not in poses:  # most boxes stand where they stood before
                     poses[id(where)] = self._box_pose(formulation, where, values)
                 boxes[name] = poses[id(where)]
             frames.append(Keyframe(q, boxes))
         return tuple(frames)
 
-    def _box_pose(self, formulation: Formulation, where: Level | Mode, values: Array) -> Array:
-        if isinstance(where, Mode):
+    def _box_pose(
+        self, formulation: Formulation, where: PlanarPose | HeldBox, values: Array
+    ) -> Array:
+        if isinstance(where, HeldBox):
             return compose(self._tools[where.gripper], _in_tool(where, values))
-        x, y, yaw, z = formulation.level(values, where)
-        return self._geometry.in_world(x, y, yaw, z)
+        pose = pose_values(values, formulation.program.variables, where)
+        return self._geometry.in_world(*pose)
 
 
 _MARGINS = (
     Margins(),
-    Margins(clear=0.0, arms=0.0, beside=0.003),
-    Margins(clear=-0.004, arms=-0.01, beside=0.003),
+    Margins(clear=0.0, apart=0.0, beside=0.003),
+    Margins(clear=-0.004, apart=-0.01, beside=0.003),
 )
 """Comfortable ones, close ones, and such that only the verification limits: starts take turns."""
 
@@ -207,9 +205,9 @@ class _Programs:
         self._geometry = geometry
         self._built: dict[int, Formulation] = {}
 
-    def __getitem__(self, attempt: int) -> Formulation:
+    def __getitem__(self, number: int) -> Formulation:
         """The program that a start solves."""
-        index = attempt % len(_MARGINS)
+        index = number % len(_MARGINS)
         if index not in self._built:
             self._built[index] = Formulator(self._geometry, _MARGINS[index]).build(self.skeleton)
         return self._built[index]
@@ -219,17 +217,17 @@ _NOISE = 0.3
 """Spread of the choices in all starts but the first."""
 
 
-def _generator(skeleton: Skeleton, attempt: int) -> np.random.Generator:
+def _generator(skeleton: Skeleton, number: int) -> np.random.Generator:
     """Random numbers of one start: of the skeleton and the number of the start only."""
-    return np.random.default_rng([zlib.crc32(format_skeleton(skeleton).encode()), attempt])
+    return np.random.default_rng([zlib.crc32(format_skeleton(skeleton).encode()), number])
 
 
-def _in_tool(mode: Mode, values: Array) -> Array:
+def _in_tool(held: HeldBox, values: Array) -> Array:
     """Pose (7,) of a held box in the tool frame of its gripper."""
-    pitch, offset = values[mode.pitch], values[mode.offset]
-    reach = mode.half_length * abs(np.cos(pitch)) + mode.half_height * np.sin(pitch)
+    pitch, offset = values[held.pitch], values[held.offset]
+    reach = held.half_length * abs(np.cos(pitch)) + held.half_height * np.sin(pitch)
     level = np.array([0.0, -np.sin(pitch / 2), 0.0, np.cos(pitch / 2)])
-    turned = multiply(level, pose((0, 0, 0), -mode.turn)[3:])
+    turned = multiply(level, pose((0, 0, 0), -held.turn)[3:])
     return np.array([reach + pr2.PALM_FRONT + PALM_GAP, 0.0, offset, *turned])
 
 
@@ -237,17 +235,14 @@ def _worst(formulation: Formulation, solution: Solution, slack: float) -> Failur
     """The constraint that is violated most."""
     starts = formulation.program.row_start
     excess, index, position = -np.inf, 0, 0
-    for i, row in enumerate(formulation.rows):
+    table = kernel_table(robot_kinematics())
+    for i, instance in enumerate(formulation.instances):
         values = solution.residuals[starts[i] : starts[i + 1]]
-        amounts = np.abs(values) if kernels()[row.kernel].equality else -values - slack
+        amounts = np.abs(values) if table[instance.kernel].equality else -values - slack
         highest = int(np.argmax(amounts))
         if amounts[highest] > excess:
             excess, index, position = float(amounts[highest]), i, highest
-    row = formulation.rows[index]
-    kernel = kernels()[row.kernel]
+    instance = formulation.instances[index]
     amount = abs(float(solution.residuals[starts[index] + position]))
-    names = list(row.names)
-    if kernel.name in ("clear", "apart"):
-        names[1] = f"{pr2.SIDE[names[1]]}_{sphere_link(position, kernel.name)}"
-    scale = SCALE if position < kernel.lengths else 1.0
-    return Failure(row.action, " ".join(names), amount / scale, "solver")
+    scale = SCALE if position < table[instance.kernel].lengths else 1.0
+    return Failure(instance.action, instance.name(position), amount / scale, "solver")
