@@ -4,9 +4,11 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from guided_lgp.bounds.program.kinematics import inverse, robot_kinematics
+from guided_lgp.bounds.program.closed_form import human_like, inverse
+from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.poses import apply, rotation_matrix
 from guided_lgp.poses import inverse as inverse_pose
+from guided_lgp.robots import load_robot
 from guided_lgp.scene import GRIPPERS, Box, PlacedRobot, Scene, Table, pr2
 
 TORSO = 0.21
@@ -17,7 +19,8 @@ SCENE = Scene(
 )
 
 
-(CHAIN,) = robot_kinematics().chains
+(CHAIN,) = kinematics_of(load_robot("pr2")).chains
+LENGTHS = human_like(CHAIN)
 
 
 def _forward() -> ca.Function:
@@ -50,7 +53,7 @@ def test_closed_form_inverse_kinematics_invert_the_forward_ones() -> None:
     closed_form = ca.Function(
         "inverse",
         [position, rotation, pan, branch, side],
-        [inverse(CHAIN, position, rotation, pan, branch, side, TORSO)],
+        [inverse(LENGTHS, position, rotation, pan, branch, side, TORSO)],
     )
     for joints in rng.uniform(*pr2.JOINT_LIMITS[:7].T, size=(100, 7)):
         for hand in (1.0, -1.0):
@@ -69,7 +72,7 @@ def test_closed_form_inverse_kinematics_invert_the_forward_ones() -> None:
 def test_a_target_out_of_reach_reports_the_missing_distance() -> None:
     eye = ca.SX(np.eye(3))
     x = ca.SX.sym("x")
-    solution = inverse(CHAIN, ca.vertcat(x, 0.188, 0.790675 + TORSO), eye, 0.0, 1.0, 1.0, TORSO)
+    solution = inverse(LENGTHS, ca.vertcat(x, 0.188, 0.790675 + TORSO), eye, 0.0, 1.0, 1.0, TORSO)
     missing = ca.Function("missing", [x], [solution[7]])
     # shoulder at x = -0.05, then 0.1 + 0.4 + 0.321 + 0.18 m of arm
     assert float(missing(0.95)) == pytest.approx(0.0, abs=1e-9)

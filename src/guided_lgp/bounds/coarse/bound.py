@@ -3,27 +3,21 @@
 import time
 import weakref
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from guided_lgp.bounds.coarse.decoding import Decoder
 from guided_lgp.bounds.coarse.formulation import Formulation, Formulator
 from guided_lgp.bounds.coarse.solver import Settings, Solution, Solver, default_solver
 from guided_lgp.bounds.coarse.starts import Starts
-from guided_lgp.bounds.program.draft import pose_values
 from guided_lgp.bounds.program.geometry import Margins, SceneGeometry
-from guided_lgp.bounds.program.kernels import SCALE
-from guided_lgp.bounds.program.kinematics import robot_kinematics
-from guided_lgp.bounds.program.slots import HeldBox, KeyframeSlots, PlanarPose
-from guided_lgp.bounds.results import Array, CoarseResult, Failure, Keyframe
-from guided_lgp.bounds.terms import kernel_table
-from guided_lgp.bounds.terms.hold import PALM_GAP
+from guided_lgp.bounds.results import Array, CoarseResult, Failure
 from guided_lgp.bounds.terms.term import UngraspableError
 from guided_lgp.bounds.verify import verify_keyframes
 from guided_lgp.logic import Skeleton, format_skeleton
-from guided_lgp.poses import compose, multiply, pose
-from guided_lgp.scene import GRIPPERS, Scene, pr2
+from guided_lgp.scene import Scene
 from guided_lgp.scene.world import World
 
 
@@ -46,16 +40,13 @@ class CoarseBound:
         """Prepare a scene; ``restarts`` is the number of starts before giving up."""
         self.scene = scene
         self._restarts = restarts
-        self._solver = solver or default_solver()
-        self._robot = robot_kinematics()
+        self._solver = solver or default_solver(scene.robot.description)
         self._geometry = SceneGeometry(scene)
         self._starts = Starts(self._geometry, self._solver)
+        self._decoder = Decoder(self._geometry)
         self._settings = Settings()
         self._world = World(scene)
         weakref.finalize(self, self._world.close)
-        self._tools = {
-            gripper: pr2.tool_pose(scene, pr2.HOME_CONFIGURATION, gripper) for gripper in GRIPPERS
-        }
 
     def solve(self, skeleton: Skeleton, prefix: CoarseResult | None = None) -> CoarseResult:
         """The verdict on a skeleton.
@@ -143,10 +134,12 @@ class CoarseBound:
     ) -> CoarseSolution:
         """Decode a solution and verify it, from the first action on that is not verified yet."""
         if not solution.converged(self._settings):
-            failure = _worst(formulation, solution, self._settings.slack)
+            failure = self._decoder.failure(formulation, solution, self._settings.slack)
             return CoarseSolution(skeleton, feasible=False, failure=failure, restarts=restarts)
-        at_switch = self._keyframes(formulation, formulation.at_switch, solution.values)
-        after_action = self._keyframes(formulation, formulation.after_action, solution.values)
+        at_switch = self._decoder.keyframes(formulation, formulation.at_switch, solution.values)
+        after_action = self._decoder.keyframes(
+            formulation, formulation.after_action, solution.values
+        )
         found = verify_keyframes(self._world, skeleton, at_switch, after_action, verified)
         if found is not None:
             failure = Failure(found.action, found.constraint, found.amount, "verification")
@@ -159,34 +152,6 @@ class CoarseBound:
             restarts=restarts,
             values=solution.values[: formulation.program.variables],
         )
-
-    def _keyframes(
-        self, formulation: Formulation, keyframes: Iterable[KeyframeSlots], values: Array
-    ) -> tuple[Keyframe, ...]:
-        """Arms and boxes in the world at keyframes of the program."""
-        poses: dict[int, Array] = {}
-        frames = []
-        for slots in keyframes:
-            q = pr2.HOME_CONFIGURATION.copy()
-            for gripper, joints in slots.joints.items():
-                if joints is not None:
-                    signs = self._robot.arms[gripper].signs
-                    q[pr2.arm_slice(gripper)] = signs * values[list(joints)]
-            boxes = {}
-            for name, where in slots.boxes.items():
-                if id(where) not in poses:  # most boxes stand where they stood before
-                    poses[id(where)] = self._box_pose(formulation, where, values)
-                boxes[name] = poses[id(where)]
-            frames.append(Keyframe(q, boxes))
-        return tuple(frames)
-
-    def _box_pose(
-        self, formulation: Formulation, where: PlanarPose | HeldBox, values: Array
-    ) -> Array:
-        if isinstance(where, HeldBox):
-            return compose(self._tools[where.gripper], _in_tool(where, values))
-        pose = pose_values(values, formulation.program.variables, where)
-        return self._geometry.in_world(*pose)
 
 
 _MARGINS = (
@@ -220,29 +185,3 @@ _NOISE = 0.3
 def _generator(skeleton: Skeleton, number: int) -> np.random.Generator:
     """Random numbers of one start: of the skeleton and the number of the start only."""
     return np.random.default_rng([zlib.crc32(format_skeleton(skeleton).encode()), number])
-
-
-def _in_tool(held: HeldBox, values: Array) -> Array:
-    """Pose (7,) of a held box in the tool frame of its gripper."""
-    pitch, offset = values[held.pitch], values[held.offset]
-    reach = held.half_length * abs(np.cos(pitch)) + held.half_height * np.sin(pitch)
-    level = np.array([0.0, -np.sin(pitch / 2), 0.0, np.cos(pitch / 2)])
-    turned = multiply(level, pose((0, 0, 0), -held.turn)[3:])
-    return np.array([reach + pr2.PALM_FRONT + PALM_GAP, 0.0, offset, *turned])
-
-
-def _worst(formulation: Formulation, solution: Solution, slack: float) -> Failure:
-    """The constraint that is violated most."""
-    starts = formulation.program.row_start
-    excess, index, position = -np.inf, 0, 0
-    table = kernel_table(robot_kinematics())
-    for i, instance in enumerate(formulation.instances):
-        values = solution.residuals[starts[i] : starts[i + 1]]
-        amounts = np.abs(values) if table[instance.kernel].equality else -values - slack
-        highest = int(np.argmax(amounts))
-        if amounts[highest] > excess:
-            excess, index, position = float(amounts[highest]), i, highest
-    instance = formulation.instances[index]
-    amount = abs(float(solution.residuals[starts[index] + position]))
-    scale = SCALE if position < table[instance.kernel].lengths else 1.0
-    return Failure(instance.action, instance.name(position), amount / scale, "solver")

@@ -5,15 +5,17 @@ from pathlib import Path
 
 import casadi as ca
 
-from guided_lgp.bounds.program.kinematics import RobotKinematics
+from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.bounds.terms import kernel_table
 from guided_lgp.bounds.terms.hold import reach_function
 from guided_lgp.compiled import load_compiled
+from guided_lgp.robots import Robot
 
 
-def _source(robot: RobotKinematics) -> str:
+def _source(robot: Robot) -> str:
     """The C code of a robot's kernels, their table, and the loop."""
-    table, reach = kernel_table(robot), reach_function(robot)
+    kinematics = kinematics_of(robot)
+    table, reach = kernel_table(kinematics), reach_function(kinematics)
     generator = ca.CodeGenerator("kernels", {"casadi_int": "int", "with_header": False})
     functions = [f for kernel in table for f in (kernel.residual, kernel.jacobian)]
     for function in (*functions, reach):
@@ -33,7 +35,7 @@ def _source(robot: RobotKinematics) -> str:
     return f"{generator.dump()}\n{defines}\n{loop}"
 
 
-def load_library(robot: RobotKinematics) -> ctypes.CDLL | None:
+def load_library(robot: Robot) -> ctypes.CDLL | None:
     """The compiled solver of a robot's kernels, or None if it is not there and no compiler works.
 
     Raises:

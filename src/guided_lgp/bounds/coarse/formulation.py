@@ -14,7 +14,7 @@ import numpy as np
 from guided_lgp.bounds.program.arrays import Instance, Program
 from guided_lgp.bounds.program.context import Context, Line, Start
 from guided_lgp.bounds.program.geometry import Margins, SceneGeometry
-from guided_lgp.bounds.program.kinematics import robot_kinematics
+from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.bounds.program.slots import ArmConfiguration, HeldBox, KeyframeSlots
 from guided_lgp.bounds.results import Array
 from guided_lgp.bounds.terms import find_term, kernel_table
@@ -41,7 +41,7 @@ class Formulator:
     """Builds the program of one skeleton."""
 
     def __init__(self, geometry: SceneGeometry, margins: Margins) -> None:
-        robot = robot_kinematics()
+        robot = kinematics_of(geometry.scene.robot.description)
         self._context = Context(geometry, robot, kernel_table(robot), margins)
 
     def build(self, skeleton: Skeleton) -> Formulation:

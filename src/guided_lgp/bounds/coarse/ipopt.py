@@ -7,9 +7,10 @@ import numpy as np
 
 from guided_lgp.bounds.coarse.solver import Interpreter, Settings, Solution, equalities
 from guided_lgp.bounds.program.arrays import Program
-from guided_lgp.bounds.program.kinematics import robot_kinematics
+from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.bounds.results import Array
 from guided_lgp.bounds.terms import kernel_table
+from guided_lgp.robots import Robot
 
 
 class Ipopt:
@@ -19,12 +20,12 @@ class Ipopt:
     nothing is shared between programs.
     """
 
-    def __init__(self, program: Program, values: Array, settings: Settings) -> None:
+    def __init__(self, robot: Robot, program: Program, values: Array, settings: Settings) -> None:
         """Set up a program; ``values`` gives the constants (variables first, then constants)."""
         self._program = program
         self._settings = settings
-        self._robot = robot_kinematics()
-        self._table = kernel_table(self._robot)
+        self._interpreter = Interpreter(robot)
+        self._table = kernel_table(kinematics_of(robot))
         count = program.variables
         self._constants = values[count:]
         x = ca.SX.sym("x", count)
@@ -70,7 +71,7 @@ class Ipopt:
             ubg=self._upper,
         )
         everything = np.concatenate([np.array(answer["x"]).ravel(), self._constants])
-        c = Interpreter(self._robot).residuals(program, everything)
+        c = self._interpreter.residuals(program, everything)
         equality = equalities(self._table, program)
         worst = float(np.max(np.where(equality, np.abs(c), -c - self._settings.slack), initial=0.0))
         return Solution(everything, c, worst, int(self._solver.stats()["iter_count"]))

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from guided_lgp.bounds.coarse.compiler import load_library
 from guided_lgp.bounds.program.arrays import Program
 from guided_lgp.bounds.program.kernels import Kernel, KernelTable
-from guided_lgp.bounds.program.kinematics import RobotKinematics, robot_kinematics
+from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.bounds.results import Array
 from guided_lgp.bounds.terms import kernel_table
 from guided_lgp.bounds.terms.hold import reach_function
+from guided_lgp.robots import Robot
 
 _log = logging.getLogger(__name__)
 
@@ -126,9 +127,9 @@ class Compiled:
 class Interpreter:
     """The same loop in numpy, with the kernels on CasADi's virtual machine."""
 
-    def __init__(self, robot: RobotKinematics) -> None:
-        self._robot = robot
-        self._table = kernel_table(robot)
+    def __init__(self, robot: Robot) -> None:
+        self._robot = kinematics_of(robot)
+        self._table = kernel_table(self._robot)
 
     def solve(self, program: Program, values: Array, settings: Settings) -> Solution:
         """See :class:`Solver`."""
@@ -254,9 +255,8 @@ def _merit(
 
 
 @cache
-def default_solver(robot: RobotKinematics | None = None) -> Solver:
+def default_solver(robot: Robot) -> Solver:
     """The compiled solver, or the interpreted one where there is no C compiler (said once)."""
-    robot = robot or robot_kinematics()
     library = load_library(robot)
     if library is not None:
         return Compiled(library)

@@ -11,7 +11,7 @@ from guided_lgp.bounds.coarse.formulation import Formulation
 from guided_lgp.bounds.coarse.solver import Solver
 from guided_lgp.bounds.program.draft import Draft
 from guided_lgp.bounds.program.geometry import SceneGeometry
-from guided_lgp.bounds.program.kinematics import robot_kinematics
+from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.bounds.results import Array
 from guided_lgp.bounds.terms import hold
 
@@ -20,7 +20,8 @@ class Starts:
     """Draws starts for one formulation."""
 
     def __init__(self, geometry: SceneGeometry, solver: Solver) -> None:
-        self._fixed = (geometry.scene.robot.torso,)
+        self._robot = kinematics_of(geometry.scene.robot.description)
+        self._fixed = tuple(geometry.scene.robot.fixed_values.values())
         self._solver = solver
 
     def draw(
@@ -53,7 +54,7 @@ class Starts:
             kept,
             generator,
             noise,
-            robot_kinematics(),
+            self._robot,
             self._fixed,
             self._solver.reach,
         )

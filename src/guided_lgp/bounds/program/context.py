@@ -52,7 +52,7 @@ class Context:
         self.robot = robot
         self.margins = margins
         self.program = ProgramBuilder(table)
-        self.fixed = (geometry.scene.robot.torso,)
+        self.fixed = tuple(geometry.scene.robot.fixed_values.values())
         """Values of the joints that the scene sets."""
         self.pose: dict[str, PlanarPose] = {
             name: self._constant_pose(pose) for name, pose in geometry.poses.items()

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from guided_lgp.bounds.results import Array
-from guided_lgp.scene import Scene, pr2
 from guided_lgp.poses import inverse, yaw_of
+from guided_lgp.scene import Scene, pr2
 from guided_lgp.scene.world import TABLE_THICKNESS
 
 
@@ -40,7 +40,7 @@ class SceneGeometry:
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
-        to_robot = inverse(pr2.base_pose(scene))
+        to_robot = inverse(scene.robot.base_pose)
         self._turn = float(yaw_of(to_robot))
         self._shift = to_robot[:3]
         self.bodies: dict[str, Body] = {}

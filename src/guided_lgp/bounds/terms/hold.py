@@ -12,10 +12,12 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from guided_lgp import poses
+from guided_lgp.bounds.program.closed_form import human_like, inverse
 from guided_lgp.bounds.program.context import Context, Line
 from guided_lgp.bounds.program.draft import Draft
 from guided_lgp.bounds.program.kernels import SCALE, Kernel, absolute, kernel
-from guided_lgp.bounds.program.kinematics import Chain, RobotKinematics, inverse
+from guided_lgp.bounds.program.kinematics import Chain, RobotKinematics
 from guided_lgp.bounds.program.slots import (
     ArmConfiguration,
     HeldBox,
@@ -24,7 +26,6 @@ from guided_lgp.bounds.program.slots import (
 )
 from guided_lgp.bounds.results import Array
 from guided_lgp.bounds.terms.term import Term, UngraspableError
-from guided_lgp.scene.pr2 import GRASP_WIDTH
 
 PALM_GAP = 0.002
 """Distance of the box's nearest corner from the palm (m)."""
@@ -122,8 +123,9 @@ def grip(context: Context, gripper: str, box: str) -> HeldBox:
 
 def _new_grip(context: Context, gripper: str, box: str) -> HeldBox:
     turn, along, width = context.geometry.grasp_side(box)
-    if width > GRASP_WIDTH:
-        raise UngraspableError(context.action, box, width - GRASP_WIDTH)
+    widest = context.robot.arms[gripper].arm.fingers.grasp_width
+    if width > widest:
+        raise UngraspableError(context.action, box, width - widest)
     height = context.half(box)[2]
     slide = max(along, height) - PAD_MARGIN
     return HeldBox(
@@ -159,7 +161,7 @@ def _joint_variables(
 ) -> tuple[int, ...]:
     """Slots of an arm's joints; at the end of a segment, the redundant one is the contact's."""
     arm = context.robot.arms[held.gripper]
-    shared = None if contact is None else arm.redundant
+    shared = None if contact is None else arm.arm.redundant
     joints = []
     for index, ((low, high), home) in enumerate(zip(arm.limits, arm.home, strict=True)):
         if contact is not None and index == shared:
@@ -187,6 +189,15 @@ def _rows(
     )
 
 
+def in_tool(held: HeldBox, values: Array, chain: Chain) -> Array:
+    """Pose (7,) of a held box in the tool frame of its gripper."""
+    pitch, offset = values[held.pitch], values[held.offset]
+    reach = held.half_length * abs(np.cos(pitch)) + held.half_height * np.sin(pitch)
+    level = np.array([0.0, -np.sin(pitch / 2), 0.0, np.cos(pitch / 2)])
+    turned = poses.multiply(level, poses.pose((0, 0, 0), -held.turn)[3:])
+    return np.array([reach + chain.palm_front + PALM_GAP, 0.0, offset, *turned])
+
+
 # starts
 
 
@@ -194,19 +205,19 @@ def start(draft: Draft, held: HeldBox) -> None:
     """Choose one pitch for a mode and the joints of its configurations."""
     if all(configuration.joints[0] < draft.kept for configuration in held.configurations):
         return
-    poses = [draft.pose(configuration.pose) for configuration in held.configurations]
+    places = [draft.pose(configuration.pose) for configuration in held.configurations]
     tried = pitches(draft, held)
     if held.pitch >= draft.kept:
         tried = tried + draft.noise * draft.generator.uniform(-_PITCH_SPREAD, _PITCH_SPREAD)
         costs = sum(
-            least_costs(draft, held, pose[None], configuration.segments, tried)[0]
-            for configuration, pose in zip(held.configurations, poses, strict=True)
+            least_costs(draft, held, place[None], configuration.segments, tried)[0]
+            for configuration, place in zip(held.configurations, places, strict=True)
         )
         tried = tried[[draft.choose(np.asarray(costs))]]
         draft.values[held.pitch] = tried[0]
-    for configuration, pose in zip(held.configurations, poses, strict=True):
+    for configuration, place in zip(held.configurations, places, strict=True):
         if configuration.joints[0] >= draft.kept:
-            joints, costs = _solutions(draft, held, pose[None], configuration.segments, tried)
+            joints, costs = _solutions(draft, held, place[None], configuration.segments, tried)
             chosen = draft.choose(costs[0, 0])
             ends = (configuration.joints, *(s.joints for s in configuration.segments))
             for slots, values in zip(ends, joints[0, 0, :, chosen], strict=True):
@@ -292,9 +303,11 @@ def reach_function(robot: RobotKinematics) -> Any:
     Outputs (8,): joint values (mirrored for the right arm) and the distance missing to reach (m).
     """
     (chain,) = robot.chains
+    lengths = human_like(chain)
+    assert lengths is not None
     x = ca.SX.sym("x", REACH_INPUTS)
     position, rotation = tool_target(x[:3], x[3] + x[10], x[4], x[5], x[11:15], chain.palm_front)
-    solution = inverse(chain, position, rotation, x[6], x[7], x[8], x[9])
+    solution = inverse(lengths, position, rotation, x[6], x[7], x[8], x[9])
     return ca.Function("reach", [x], [solution])
 
 
