@@ -21,7 +21,8 @@ from guided_lgp import cli, parallel, tracking
 from guided_lgp.bounds.results import Trajectory
 from guided_lgp.errors import InputError
 from guided_lgp.policy.paper.dataset import load_dataset
-from guided_lgp.scene import Scene, load_scene, pr2
+from guided_lgp.robots import load_robot
+from guided_lgp.scene import Scene, load_scene
 from guided_lgp.view.replay import replay_html
 from guided_lgp.view.viewer import Viewer
 
@@ -131,6 +132,7 @@ from guided_lgp import planning
 from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.params import load_params
 from guided_lgp.policy.paper.inference import load_policy
+from guided_lgp.robots import load_robot
 from guided_lgp.scene import load_scene
 
 scene, params = load_scene(Path("examples/three_boxes.json")), load_params()
@@ -167,8 +169,8 @@ def scene() -> Scene:
 
 
 def test_a_name_of_a_scene_cannot_act_in_a_page(scene: Scene, tmp_path: Path) -> None:
-    q = np.tile(pr2.HOME_CONFIGURATION, (2, 1))
-    motion = Trajectory(pr2.ARM_JOINTS, np.arange(2.0), q, ())
+    q = np.tile(load_robot("pr2").home, (2, 1))
+    motion = Trajectory(load_robot("pr2").joint_names, np.arange(2.0), q, ())
     found = []
     for name in ("scene", "</title><script>alert(1)</script><img src=x onerror=alert(1)>"):
         file = tmp_path / "page.html"

@@ -3,18 +3,24 @@
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+import pinocchio
 
 from guided_lgp.bounds.results import Array, Attachment, Keyframe, Trajectory
 from guided_lgp.poses import compose, inverse, pose
-from guided_lgp.scene import Box, Scene, Table, pr2
-from guided_lgp.scene.reach import grasp_poses, solve_arm
+from guided_lgp.robots import load_robot
+from guided_lgp.robots.kinematics import fill
+from guided_lgp.scene import Box, Scene, Table
+from guided_lgp.scene.reach import grasp_poses
 from guided_lgp.scene.world import World, initial_poses
 
 SIZE = (0.15, 0.07, 0.10)
 TAB1 = Table(name="tab1", position=(0.54, 0.33, 0.60), half_extents=(0.17, 0.20))
 TAB2 = Table(name="tab2", position=(0.54, -0.33, 0.60), half_extents=(0.17, 0.20))
-FINGERS = tuple(joint for gripper in pr2.FINGER_JOINTS for joint in pr2.FINGER_JOINTS[gripper])
-OPEN, CLOSED = pr2.FINGER_LIMITS[1], pr2.finger_joint(SIZE[1])
+PR2 = load_robot("pr2")
+PALM_FRONT = PR2.arms["pr2L"].palm_front
+FINGERS = PR2.moving_joints[len(PR2.joint_names) :]
+HAND = PR2.arms["pr2L"].fingers
+OPEN, CLOSED = HAND.opened, HAND.value(SIZE[1])
 
 
 def scene(**boxes: tuple[float, float, float, float, str]) -> Scene:
@@ -30,7 +36,7 @@ def scene(**boxes: tuple[float, float, float, float, str]) -> Scene:
 
 def from_above(box: Box, gripper: str) -> Array:
     """Tool pose (7,) that grasps the box from above, the hand turned the natural way."""
-    poses = list(grasp_poses(box))[:2]
+    poses = list(grasp_poses(box, PALM_FRONT))[:2]
     heading = 0.3 if gripper == "pr2L" else -0.3
     return min(poses, key=lambda p: abs(np.angle(np.exp(1j * (_closing(p) - np.pi / 2 - heading)))))
 
@@ -45,7 +51,7 @@ _STARTS = np.array([[0.3, 0.3, 0.5, -1.5, 0.0, -1.0, 0.0], [0.3, 0.3, 1.5, -1.5,
 
 def reach(scene: Scene, gripper: str, tool: Array, near: Array | None = None) -> Array:
     """Arm joints (7,) that put the tool there, near a posture where one is given."""
-    starts = [start if gripper == "pr2L" else pr2.MIRROR * start for start in _STARTS]
+    starts = [PR2.arms[gripper].signs * start for start in _STARTS]
     if near is not None:
         starts.insert(0, near)
     for start in starts:
@@ -55,10 +61,36 @@ def reach(scene: Scene, gripper: str, tool: Array, near: Array | None = None) ->
     raise AssertionError(f"{gripper} does not reach {tool}")
 
 
+def solve_arm(scene: Scene, gripper: str, target: Array, start: Array) -> Array | None:
+    """Joint values (7,) that put the tool frame to a pose (7,), or None.
+
+    Damped Gauss-Newton on the pose error, joints clipped to their limits; at most 60 steps.
+    """
+    arm, kinematics = PR2.arms[gripper], PR2.kinematics
+    model, data, joints = kinematics.model, kinematics.data, kinematics.joints[arm.slice]
+    columns = [joint.velocity for joint in joints]
+    frame = model.getFrameId(arm.tool_link)
+    goal = pinocchio.XYZQUATToSE3(compose(inverse(scene.robot.base_pose), target))
+    full = kinematics.rows(PR2.home[None], scene.robot.fixed_values)[0]
+    angles = np.array(start, float)
+    for _ in range(60):
+        fill(full, joints, angles)
+        pinocchio.computeJointJacobians(model, data, full)
+        placement = pinocchio.updateFramePlacement(model, data, frame)
+        error = np.asarray(pinocchio.log6(placement.actInv(goal)).vector)
+        if np.linalg.norm(error) < 1e-5:
+            return angles
+        local = pinocchio.getFrameJacobian(model, data, frame, pinocchio.ReferenceFrame.LOCAL)
+        jacobian = local[:, columns]
+        damped = jacobian @ jacobian.T + 1e-3 * (0.01 + error @ error) * np.eye(6)
+        angles = np.clip(angles + jacobian.T @ np.linalg.solve(damped, error), *arm.limits.T)
+    return None
+
+
 def with_arm(q: Array, gripper: str, arm: Array) -> Array:
     """The configuration (14,) with one arm replaced."""
     result = q.copy()
-    result[pr2.arm_slice(gripper)] = arm
+    result[PR2.arms[gripper].slice] = arm
     return result
 
 
@@ -72,7 +104,7 @@ class Motion:
     """A motion written down step by step, at rest after each."""
 
     scene: Scene
-    q: Array = field(default_factory=pr2.HOME_CONFIGURATION.copy)
+    q: Array = field(default_factory=PR2.home.copy)
     fingers: dict[str, float] = field(default_factory=lambda: {"pr2L": OPEN, "pr2R": OPEN})
     rows: list[Array] = field(default_factory=list)
     attachments: list[Attachment] = field(default_factory=list)
@@ -117,7 +149,7 @@ class Motion:
         """Samples at equal times."""
         last = len(self.rows) - 1
         return Trajectory(
-            (*pr2.ARM_JOINTS, *FINGERS),
+            (*PR2.joint_names, *FINGERS),
             period * np.arange(len(self.rows)),
             np.array(self.rows),
             tuple(replace(a, end=last) if a.end < 0 else a for a in self.attachments),
@@ -141,7 +173,7 @@ def place(motion: Motion, gripper: str, box: str, grip: Array, target: Array) ->
     at = reach(motion.scene, gripper, tool)
     above = reach(motion.scene, gripper, shifted(tool, z=0.10), at)
     motion.move(gripper, above).move(gripper, at).release(box).hand(gripper, OPEN)
-    motion.move(gripper, above).move(gripper, pr2.HOME[gripper])
+    motion.move(gripper, above).move(gripper, PR2.arms[gripper].home)
 
 
 def keyframe(world: World, q: Array, **boxes: Array) -> Keyframe:

@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from motions import CLOSED, Motion, from_above, grasp, place, reach, scene, shifted
+from motions import CLOSED, PALM_FRONT, PR2, Motion, from_above, grasp, place, reach, scene, shifted
 
 from guided_lgp.bounds.execution import execute
 from guided_lgp.bounds.results import Trajectory
 from guided_lgp.logic import parse_objective, parse_skeleton
 from guided_lgp.poses import compose, pose
-from guided_lgp.scene import Scene, pr2
+from guided_lgp.scene import Scene
 from guided_lgp.scene.reach import grasp_poses
 
 STACK = parse_skeleton("(grasp pr2L red) (place pr2L red green)")
@@ -41,7 +41,7 @@ def test_box_is_stacked(neighbours: Scene, stacking: Trajectory) -> None:
 def test_box_is_held(neighbours: Scene) -> None:
     motion = Motion(neighbours)
     grasp(motion, "pr2L", "red")
-    motion.move("pr2L", pr2.HOME["pr2L"])
+    motion.move("pr2L", PR2.arms["pr2L"].home)
     objective = parse_objective(["(held red)", "(on green tab1)", "(on red tab1)"])
     report = execute(neighbours, objective, STACK[:1], motion.trajectory(PERIOD))
     assert report.goals == {"(held red)": True, "(on green tab1)": True, "(on red tab1)": False}
@@ -60,7 +60,7 @@ def test_box_let_go_beside_its_support_falls(neighbours: Scene, stacking: Trajec
 def test_gripper_that_is_not_at_the_box_grasps_nothing(neighbours: Scene) -> None:
     above = shifted(from_above(neighbours.boxes[0], "pr2L"), z=0.10)
     motion = Motion(neighbours).move("pr2L", reach(neighbours, "pr2L", above))
-    motion.hand("pr2L", CLOSED).attach("red", "pr2L").move("pr2L", pr2.HOME["pr2L"])
+    motion.hand("pr2L", CLOSED).attach("red", "pr2L").move("pr2L", PR2.arms["pr2L"].home)
     objective = parse_objective(["(held red)"])
     report = execute(neighbours, objective, STACK[:1], motion.trajectory(PERIOD))
     assert not report.success
@@ -91,7 +91,9 @@ def test_box_on_a_held_box_rides_by_friction_alone(period: float, stays: bool) -
     """Carried gently it stays where it is, jerked away it falls."""
     stacked = scene(red=(0.52, 0.30, 0.65, 0.2, "tab1"), green=(0.52, 0.30, 0.75, 1.77, "red"))
     box = stacked.boxes[0]
-    tool = next(t for t in grasp_poses(box) if compose(t, pose((1, 0, 0)))[2] - t[2] > -0.01)
+    tool = next(
+        t for t in grasp_poses(box, PALM_FRONT) if compose(t, pose((1, 0, 0)))[2] - t[2] > -0.01
+    )
     back = compose(tool, pose((-0.10, 0, 0)))
     at = reach(stacked, "pr2L", tool)
     away = reach(stacked, "pr2L", back, at)

@@ -7,7 +7,10 @@ import numpy as np
 import pytest
 from motions import (
     CLOSED,
+    HAND,
     OPEN,
+    PALM_FRONT,
+    PR2,
     Motion,
     from_above,
     grasp,
@@ -21,14 +24,14 @@ from motions import (
 
 from guided_lgp.bounds.results import Array, Keyframe, Trajectory
 from guided_lgp.bounds.verify import verify_keyframe, verify_keyframes, verify_path
-from guided_lgp.bounds.verify.path import STEP, resample
+from guided_lgp.bounds.verify.phase import STEP, resample
 from guided_lgp.logic import Action, State, parse_skeleton
 from guided_lgp.poses import apply, compose, inverse, multiply, pose
-from guided_lgp.scene import Scene, pr2
+from guided_lgp.scene import Scene
 from guided_lgp.scene.reach import grasp_poses
 from guided_lgp.scene.world import World
 
-HOME = pr2.HOME_CONFIGURATION
+HOME = PR2.home
 GRASP_RED = Action.parse("(grasp pr2L red)")
 GRASP_AND_PLACE = parse_skeleton("(grasp pr2L red) (place pr2L red tab1)")
 RIGHT_FROM_ABOVE = np.array([0.0, np.sqrt(0.5), 0.0, np.sqrt(0.5)])
@@ -192,7 +195,7 @@ def test_fingers_across_the_long_side(world: World, two_boxes: Scene) -> None:
 def test_verdict_does_not_depend_on_what_was_checked_before(world: World, at_red: Array) -> None:
     rng = np.random.default_rng(0)
     frames = [
-        keyframe(world, rng.uniform(*pr2.JOINT_LIMITS.T), red=pose(rng.uniform(0.4, 0.7, 3)))
+        keyframe(world, rng.uniform(*PR2.position_limits.T), red=pose(rng.uniform(0.4, 0.7, 3)))
         for _ in range(20)
     ]
     forward = [verify_keyframe(world, frame, world.scene.state) for frame in frames]
@@ -207,9 +210,9 @@ def test_verdict_does_not_depend_on_what_was_checked_before(world: World, at_red
 def frames(two_boxes: Scene, at_red: Array) -> tuple[list[Keyframe], list[Keyframe]]:
     """Contacts and retreats of grasping the red box and placing it 10 cm further left."""
     boxes = {b.name: pose(b.position, b.yaw) for b in two_boxes.boxes}
-    tool = pr2.tool_pose(two_boxes, at_red, "pr2L")
+    tool = two_boxes.robot.tool_pose(at_red, "pr2L")
     grip = compose(inverse(tool), boxes["red"])
-    carried = boxes | {"red": compose(pr2.tool_pose(two_boxes, HOME, "pr2L"), grip)}
+    carried = boxes | {"red": compose(two_boxes.robot.tool_pose(HOME, "pr2L"), grip)}
     moved = boxes | {"red": shifted(boxes["red"], y=0.1)}
     placing = reach(two_boxes, "pr2L", shifted(tool, y=0.1))
     at_switch = [Keyframe(at_red, boxes), Keyframe(with_arm(HOME, "pr2L", placing), moved)]
@@ -278,29 +281,29 @@ def test_no_point_goes_farther_than_a_step_between_two_checks(
     two_boxes: Scene, good: Trajectory
 ) -> None:
     rng = np.random.default_rng(4)
-    low, high = np.r_[pr2.JOINT_LIMITS, np.tile(pr2.FINGER_LIMITS, (8, 1))].T
+    low, high = np.r_[PR2.position_limits, np.tile((HAND.lower, HAND.upper), (8, 1))].T
     corners = np.clip(rng.uniform(low, high, (12, 22)), -3.0, 3.0)
     times = np.arange(12.0)
     fine = np.linspace(0.0, 11.0, 600)
     anywhere = np.stack([np.interp(fine, times, column) for column in corners.T], axis=1)
     sides = rng.normal(size=(2, 60, 3))
-    reach = [0.12, 0.2]
+    reach = {"pr2L": 0.12, "pr2R": 0.2}
     for q in (good.q, anywhere):
         samples, _ = resample(two_boxes, q, np.arange(float(len(q))), reach)
         levers = 0.0
         farthest = np.zeros(len(samples) - 1)
-        for gripper, beyond, rays in zip(pr2.SIDE, reach, sides, strict=True):
+        for gripper, beyond, rays in zip(PR2.arms, reach.values(), sides, strict=True):
             ball = beyond * rays / np.linalg.norm(rays, axis=1, keepdims=True)
-            tools = pr2.tool_poses(two_boxes, samples[:, :14])[gripper]
+            tools = two_boxes.robot.tool_poses(samples[:, :14])[gripper]
             points = [apply(tools[:, None], ball)]
-            arm = pr2.ARM_LINKS[gripper]
+            arm = PR2.arms[gripper].links
             for link, ahead in ((arm[3], 0.4), (arm[6], 0.3)):  # upper arm and forearm
                 body = np.vstack([np.zeros(3), [ahead, 0, 0], [ahead / 2, 0.08, 0.0]])
-                points.append(apply(pr2.link_poses(two_boxes, samples[:, :14], [link]), body))
+                points.append(apply(two_boxes.robot.link_poses(samples[:, :14], [link]), body))
             moved = np.linalg.norm(np.diff(np.concatenate(points, axis=1), axis=0), axis=-1)
             farthest = np.maximum(farthest, moved.max(axis=1))
-            turns = np.abs(np.diff(q[:, pr2.arm_slice(gripper)], axis=0)).sum(axis=0)
-            levers = max(levers, float(turns @ (pr2.LEVER[pr2.arm_slice(gripper)] + beyond)))
+            turns = np.abs(np.diff(q[:, PR2.arms[gripper].slice], axis=0)).sum(axis=0)
+            levers = max(levers, float(turns @ (PR2.lever_arms[PR2.arms[gripper].slice] + beyond)))
         assert farthest.max() <= 1.01 * STEP
         assert len(samples) < 0.75 * levers / STEP
 
@@ -445,7 +448,7 @@ def test_link_sweeps_through_a_table(world: World, two_boxes: Scene, good: Traje
     """The arm goes down beside the table's edge and would have to pass through it."""
     low = shifted(from_above(two_boxes.boxes[0], "pr2L"), y=0.14, z=-0.15)
     motion = Motion(two_boxes).move("pr2L", reach(two_boxes, "pr2L", shifted(low, z=0.25)))
-    motion.move("pr2L", reach(two_boxes, "pr2L", low)).move("pr2L", pr2.HOME["pr2L"])
+    motion.move("pr2L", reach(two_boxes, "pr2L", low)).move("pr2L", PR2.arms["pr2L"].home)
     violation = verify_path(world, (), motion.trajectory()).violation
     assert violation is not None
     assert violation.constraint.startswith("collision l_gripper")
@@ -500,7 +503,7 @@ def test_carried_box_through_the_other_arm_on_the_way(world: World, two_boxes: S
 def test_grasp_from_afar(world: World, two_boxes: Scene) -> None:
     tool = shifted(from_above(two_boxes.boxes[0], "pr2L"), z=0.10)
     motion = Motion(two_boxes).move("pr2L", reach(two_boxes, "pr2L", tool))
-    motion.hand("pr2L", CLOSED).attach("red", "pr2L").move("pr2L", pr2.HOME["pr2L"])
+    motion.hand("pr2L", CLOSED).attach("red", "pr2L").move("pr2L", PR2.arms["pr2L"].home)
     skeleton = parse_skeleton("(grasp pr2L red)")
     violation = verify_path(world, skeleton, motion.trajectory()).violation
     assert violation is not None
@@ -511,7 +514,9 @@ def test_stack_tipped_while_it_is_carried() -> None:
     """The hand grasps the lower box of two from its end and goes home, which tips it."""
     stacked = scene(red=(0.52, 0.30, 0.65, 0.2, "tab1"), green=(0.52, 0.30, 0.75, 1.77, "red"))
     box = stacked.boxes[0]
-    tool = next(t for t in grasp_poses(box) if compose(t, pose((1, 0, 0)))[2] - t[2] > -0.01)
+    tool = next(
+        t for t in grasp_poses(box, PALM_FRONT) if compose(t, pose((1, 0, 0)))[2] - t[2] > -0.01
+    )
     at = reach(stacked, "pr2L", tool)
     back = compose(tool, pose((-0.10, 0, 0)))
     away = reach(stacked, "pr2L", back, at)
@@ -521,7 +526,7 @@ def test_stack_tipped_while_it_is_carried() -> None:
         Motion(stacked).move("pr2L", above).move("pr2L", away).move("pr2L", at).hand("pr2L", CLOSED)
     )
     motion.attach("red", "pr2L").attach("green", "pr2L")
-    motion.move("pr2L", lifted).move("pr2L", pr2.HOME["pr2L"])
+    motion.move("pr2L", lifted).move("pr2L", PR2.arms["pr2L"].home)
     with World(stacked) as world:
         skeleton = parse_skeleton("(grasp pr2L red)")
         violation = verify_path(world, skeleton, motion.trajectory()).violation

@@ -21,8 +21,8 @@ from guided_lgp.logic import (
 )
 from guided_lgp.paths import EVALUATION, METRICS, SCENES, SEQUENCES, TRAINING
 from guided_lgp.policy.paper.encoding import CHAINS
+from guided_lgp.robots import load_robot
 from guided_lgp.scene import Scene, generate
-from guided_lgp.scene.pr2 import ARM_JOINTS, HOME_CONFIGURATION
 
 TREE: dict[str, tuple[float | None, ...]] = {
     "breadth_first": (400.0, 3000.0, 44000.0, 216000.0, *[None] * 6),
@@ -240,6 +240,6 @@ class Bounds:
 def motion(box: str) -> Trajectory:
     """The left arm swings to the front for two seconds and carries a box meanwhile."""
     times = np.linspace(0.0, 2.0, 41)
-    q = np.tile(HOME_CONFIGURATION, (len(times), 1))
+    q = np.tile(load_robot("pr2").home, (len(times), 1))
     q[:, 0] -= 0.8 * np.sin(np.pi * times / 4)
-    return Trajectory(ARM_JOINTS, times, q, (Attachment(box, "pr2L", 10, 30),))
+    return Trajectory(load_robot("pr2").joint_names, times, q, (Attachment(box, "pr2L", 10, 30),))

@@ -3,7 +3,6 @@
 import numpy as np
 
 from guided_lgp.bounds.path.ik import REACH
-from guided_lgp.bounds.results import JOINT_NAMES
 from guided_lgp.robots import load_robot
 from guided_lgp.scene import GRIPPERS, pr2
 
@@ -13,7 +12,6 @@ ROBOT = load_robot("pr2")
 def test_joints_and_limits() -> None:
     assert ROBOT.grippers == GRIPPERS
     assert ROBOT.joint_names == pr2.ARM_JOINTS
-    assert ROBOT.moving_joints == JOINT_NAMES
     assert ROBOT.continuous == pr2.CONTINUOUS
     assert ROBOT.home.tobytes() == pr2.HOME_CONFIGURATION.tobytes()
     assert ROBOT.position_limits.tobytes() == pr2.JOINT_LIMITS.tobytes()

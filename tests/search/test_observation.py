@@ -4,7 +4,6 @@ import numpy as np
 
 from guided_lgp.bounds.results import Keyframe
 from guided_lgp.scene.model import Scene
-from guided_lgp.scene.pr2 import tool_pose
 from guided_lgp.search.observation import observe, start
 
 
@@ -28,4 +27,4 @@ def test_follows_the_configuration(scene: Scene) -> None:
     )
     seen = observe(scene, moved)
     np.testing.assert_array_equal(seen["red"], (0.1, 0.2, 0.9))
-    np.testing.assert_allclose(seen["pr2R"], tool_pose(scene, moved.q, "pr2R")[:3])
+    np.testing.assert_allclose(seen["pr2R"], scene.robot.tool_pose(moved.q, "pr2R")[:3])

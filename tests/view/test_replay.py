@@ -11,7 +11,6 @@ import pytest
 from guided_lgp.errors import InputError
 from guided_lgp.poses import compose, inverse, pose
 from guided_lgp.scene import Scene, generate
-from guided_lgp.scene.pr2 import ARM_JOINTS, tool_pose
 from guided_lgp.scene.world import COLOURS
 from guided_lgp.view.live import view
 from guided_lgp.view.replay import play, replay_html
@@ -26,9 +25,11 @@ def scene() -> Scene:
 def test_tool_pose_agrees_with_the_kinematics(scene: Scene) -> None:
     q = outputs.motion("red").q[25]
     with Viewer(scene) as viewer:
-        viewer.configure(dict(zip(ARM_JOINTS, q, strict=True)))
+        viewer.configure(dict(zip(scene.robot.description.joint_names, q, strict=True)))
         for gripper in ("pr2L", "pr2R"):
-            assert np.allclose(viewer.tool_pose(gripper), tool_pose(scene, q, gripper), atol=1e-9)
+            assert np.allclose(
+                viewer.tool_pose(gripper), scene.robot.tool_pose(q, gripper), atol=1e-9
+            )
 
 
 def test_an_attached_box_follows_the_tool_and_stays_where_it_is_left(scene: Scene) -> None:
@@ -36,8 +37,8 @@ def test_an_attached_box_follows_the_tool_and_stays_where_it_is_left(scene: Scen
     trajectory = outputs.motion(name)
     (carried,) = trajectory.attachments
     start = pose(scene.boxes[0].position, scene.boxes[0].yaw)
-    grasp = compose(inverse(tool_pose(scene, trajectory.q[carried.start], "pr2L")), start)
-    end = compose(tool_pose(scene, trajectory.q[carried.end], "pr2L"), grasp)
+    grasp = compose(inverse(scene.robot.tool_pose(trajectory.q[carried.start], "pr2L")), start)
+    end = compose(scene.robot.tool_pose(trajectory.q[carried.end], "pr2L"), grasp)
     assert np.linalg.norm(end[:3] - start[:3]) > 0.1
     with Viewer(scene) as viewer:
         total = sum(play(viewer, trajectory))

@@ -14,9 +14,9 @@ import numpy as np
 from guided_lgp.bounds.results import Array, Trajectory
 from guided_lgp.bounds.verify.geometry import Violation, box_sizes, grasp_faults
 from guided_lgp.bounds.verify.path import switches_of
-from guided_lgp.logic import Goal, Objective, Skeleton
+from guided_lgp.logic import Goal, Objective, Skeleton, successor
 from guided_lgp.poses import compose, inverse
-from guided_lgp.scene import Scene, pr2
+from guided_lgp.scene import Scene
 from guided_lgp.scene.bullet import pybullet
 from guided_lgp.scene.world import World, initial_poses
 
@@ -30,7 +30,8 @@ UPRIGHT = 0.9
 """Least vertical part of the contact normals where a box stands on something."""
 HELD_SLACK = 0.02
 """How far (m) a held box may have slipped in the hand at the end."""
-_ARM_FORCE, _FINGER_FORCE, _TORSO_FORCE = 1000.0, 100.0, 1e5
+_ARM_FORCE, _FINGER_FORCE, _FIXED_FORCE = 1000.0, 100.0, 1e5
+"""Largest force (N or Nm) of the joints of arms and hands, and of those that the scene fixes."""
 
 
 @dataclass(frozen=True)
@@ -65,18 +66,21 @@ def execute(
     with World(scene) as world:
         run = _Execution(world, trajectory)
         run.rest()
-        for index, (action, row) in enumerate(zip(skeleton, rows, strict=True)):
-            if action.instruction == "grasp":
-                run.touch(action.gripper, action.box)
+        state, left = scene.state, set[tuple[str, str]]()
+        for action, row in zip(skeleton, rows, strict=True):
+            before, state = state, successor(state, action)
+            taken = sorted(set(state.held) - set(before.held))
+            for box, gripper in taken:
+                run.touch(gripper, box)
             run.follow(float(trajectory.times[row]))
-            if index and skeleton[index - 1].instruction == "place":
-                last = skeleton[index - 1]
-                if (last.gripper, last.box) != (action.gripper, action.box):
-                    run.touch(last.gripper, last.box, allowed=False)
-            if action.instruction == "place":
-                run.release(action.box)
-            elif fault := run.grasp(action.gripper, action.box):
-                return PhysicsReport(False, fault=fault)
+            for box, gripper in sorted(left.difference(taken)):
+                run.touch(gripper, box, allowed=False)
+            for box, gripper in taken:
+                if fault := run.grasp(gripper, box):
+                    return PhysicsReport(False, fault=fault)
+            left = set(before.held) - set(state.held)
+            for box, gripper in sorted(left):
+                run.release(gripper, box)
         run.follow(float(trajectory.times[-1]))
         run.rest()
         goals = {str(goal): run.holds(goal) for goal in objective}
@@ -87,10 +91,11 @@ def execute(
 def final_boxes(scene: Scene, trajectory: Trajectory) -> dict[str, Array]:
     """Where a plan leaves every box: poses (7,), from the scene, the attachments and kinematics."""
     boxes = initial_poses(scene)
-    arms = trajectory.q[:, [trajectory.joint_names.index(name) for name in pr2.ARM_JOINTS]]
+    names = scene.robot.description.joint_names
+    arms = trajectory.q[:, [trajectory.joint_names.index(name) for name in names]]
     for attachment in sorted(trajectory.attachments, key=lambda attachment: attachment.start):
-        ends = pr2.tool_poses(scene, arms[[attachment.start, attachment.end]])
-        start, end = ends[attachment.gripper]
+        ends = arms[[attachment.start, attachment.end]]
+        start, end = scene.robot.tool_poses(ends)[attachment.gripper]
         boxes[attachment.box] = compose(end, compose(inverse(start), boxes[attachment.box]))
     return boxes
 
@@ -101,10 +106,12 @@ class _Execution:
     def __init__(self, world: World, trajectory: Trajectory) -> None:
         self._world = world
         self._client = world.client
-        self._grips: dict[str, tuple[str, int, Array]] = {}
+        self._robot = world.scene.robot.description
+        self._grips: dict[tuple[str, str], tuple[int, Array]] = {}
         self._joints = [world.joints[name] for name in trajectory.joint_names]
         self._forces = [
-            _FINGER_FORCE if "gripper" in name else _ARM_FORCE for name in trajectory.joint_names
+            _ARM_FORCE if name in self._robot.joint_names else _FINGER_FORCE
+            for name in trajectory.joint_names
         ]
         steps = int(np.ceil(trajectory.times[-1] * RATE)) + 1
         moments = np.arange(steps) / RATE
@@ -114,16 +121,16 @@ class _Execution:
         self._step = 0
         pybullet.setGravity(0, 0, -9.81, physicsClientId=self._client)
         pybullet.setTimeStep(1 / RATE, physicsClientId=self._client)
+        fixed = world.scene.robot.fixed_values
         for name, joint in world.joints.items():
             kind = pybullet.getJointInfo(world.robot, joint, physicsClientId=self._client)[2]
             if kind != pybullet.JOINT_FIXED:
-                torso = name == "torso_lift_joint"
                 pybullet.setJointMotorControl2(
                     world.robot,
                     joint,
                     pybullet.POSITION_CONTROL,
-                    targetPosition=world.scene.robot.torso if torso else 0.0,
-                    force=_TORSO_FORCE if torso else _FINGER_FORCE,
+                    targetPosition=fixed.get(name, 0.0),
+                    force=_FIXED_FORCE if name in fixed else _FINGER_FORCE,
                     physicsClientId=self._client,
                 )
 
@@ -144,7 +151,7 @@ class _Execution:
 
         The hulls bridge the hollow of the fingers: they would push the box away.
         """
-        for link in pr2.HAND_LINKS[gripper]:
+        for link in self._robot.arms[gripper].hand_links:
             pybullet.setCollisionFilterPair(
                 self._world.robot,
                 self._world.boxes[box],
@@ -157,11 +164,11 @@ class _Execution:
     def grasp(self, gripper: str, box: str) -> str:
         """Fix the box to the palm as they are; returns a fault if the gripper is not there."""
         tool, placement = self._tool(gripper), self._box(box)
-        size = box_sizes(self._world.scene)[box]
-        faults = grasp_faults(box, size, placement.tolist(), tool.tolist())
+        size, arm = box_sizes(self._world.scene)[box], self._robot.arms[gripper]
+        faults = grasp_faults(box, size, placement.tolist(), tool.tolist(), arm.palm_front)
         if faults and faults[0].amount > GRASP_SLACK:
             return faults[0].constraint
-        palm = self._world.links[pr2.HAND_LINKS[gripper][0]]
+        palm = self._world.links[arm.hand_links[0]]
         state = pybullet.getLinkState(
             self._world.robot,
             palm,
@@ -181,20 +188,20 @@ class _Execution:
             relative[3:],
             physicsClientId=self._client,
         )
-        self._grips[box] = gripper, constraint, compose(inverse(tool), placement)
+        self._grips[gripper, box] = constraint, compose(inverse(tool), placement)
         return ""
 
-    def release(self, box: str) -> None:
-        """Remove the constraint that holds the box."""
-        _, constraint, _ = self._grips.pop(box)
+    def release(self, gripper: str, box: str) -> None:
+        """Remove the constraint by which the gripper holds the box."""
+        constraint, _ = self._grips.pop((gripper, box))
         pybullet.removeConstraint(constraint, physicsClientId=self._client)
 
     def holds(self, goal: Goal) -> bool:
         """Whether a goal holds: held in a hand, or at rest upon a table and not held."""
-        if goal.box in self._grips:
-            gripper, _, grip = self._grips[goal.box]
-            slip = compose(self._tool(gripper), grip)[:3] - self._box(goal.box)[:3]
-            return goal.kind == "held" and bool(np.linalg.norm(slip) < HELD_SLACK)
+        for (gripper, held), (_, grip) in self._grips.items():
+            if held == goal.box:
+                slip = compose(self._tool(gripper), grip)[:3] - self._box(held)[:3]
+                return goal.kind == "held" and bool(np.linalg.norm(slip) < HELD_SLACK)
         if goal.kind == "held" or goal.table is None:
             return False
         box, table = self._world.boxes[goal.box], self._body(goal.table)
@@ -224,7 +231,7 @@ class _Execution:
         pybullet.stepSimulation(physicsClientId=self._client)
 
     def _tool(self, gripper: str) -> Array:
-        return np.asarray(self._world.link_poses([pr2.TOOL_LINK[gripper]])[0])
+        return np.asarray(self._world.tool_poses([gripper])[0])
 
     def _box(self, box: str) -> Array:
         position, turn = pybullet.getBasePositionAndOrientation(

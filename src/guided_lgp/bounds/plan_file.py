@@ -14,7 +14,7 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from guided_lgp.bounds.results import JOINT_NAMES, Attachment, Keyframe, PathResult, Trajectory
+from guided_lgp.bounds.results import Attachment, Keyframe, PathResult, Trajectory
 from guided_lgp.bounds.verify.path import switches_of
 from guided_lgp.documents import read_json, write_text
 from guided_lgp.errors import InputError
@@ -102,8 +102,9 @@ class Plan(_Document):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        if sorted(self.joint_names) != sorted(JOINT_NAMES):
-            raise ValueError(f"joint_names are not the {len(JOINT_NAMES)} of arms and fingers")
+        moving = self.scene.robot.description.moving_joints
+        if sorted(self.joint_names) != sorted(moving):
+            raise ValueError(f"joint_names are not the {len(moving)} of arms and fingers")
         rows, width = len(self.path.times), len(self.joint_names)
         if len(self.path.q) != rows:
             raise ValueError(f"path.q has {len(self.path.q)} rows for {rows} times")
@@ -160,7 +161,7 @@ def write_plan(
         "objective": list(map(str, objective)),
         "actions": list(map(str, result.skeleton)),
         "joint_names": list(trajectory.joint_names),
-        "fixed_joints": {"torso_lift_joint": scene.robot.torso},
+        "fixed_joints": scene.robot.fixed_values,
         "keyframes": [
             {"q": rows[switch].tolist(), "boxes": _boxes(keyframe)}
             for switch, keyframe in zip(switches, result.at_switch, strict=True)

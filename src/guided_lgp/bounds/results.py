@@ -1,7 +1,7 @@
 """What the two bounds of the NLP return.
 
-Conventions, everywhere: configurations ``q`` are the 14 arm joints in the order of
-``guided_lgp.scene.pr2.ARM_JOINTS`` (left arm, then right arm; rad). Poses are arrays
+Conventions, everywhere: configurations ``q`` (n,) are the joints of the robot's arms in the order
+of ``Robot.joint_names`` (rad). Poses are arrays
 ``[x, y, z, qx, qy, qz, qw]`` of the box centre in the world (m). The world frame is the scene's:
 its origin on the floor under the robot's base.
 """
@@ -13,21 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guided_lgp.logic import Skeleton
-from guided_lgp.scene import GRIPPERS
-from guided_lgp.scene.pr2 import ARM_JOINTS, FINGER_JOINTS
 
 Array = NDArray[np.float64]
-
-JOINT_NAMES: tuple[str, ...] = (
-    *ARM_JOINTS,
-    *(joint for gripper in GRIPPERS for joint in FINGER_JOINTS[gripper]),
-)
-"""Every joint that moves: both arms, then the fingers of both hands."""
 
 
 @dataclass(frozen=True)
 class Keyframe:
-    """A configuration x_k: arm joints (14,) in rad and the pose (7,) of every box."""
+    """A configuration x_k: arm joints (n,) in rad and the pose (7,) of every box."""
 
     q: Array
     boxes: Mapping[str, Array]
@@ -82,7 +74,7 @@ class Trajectory:
     """A dense, time-parameterised motion (paper, eq. 4)."""
 
     joint_names: tuple[str, ...]
-    """Every joint that moves (``JOINT_NAMES``), in any order."""
+    """Every joint that moves (``Robot.moving_joints``), in any order."""
     times: Array
     """(T,) s, strictly increasing."""
     q: Array

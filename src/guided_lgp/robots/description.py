@@ -33,6 +33,8 @@ class JointDescription:
     velocity: float
     mimic: float
     """Factor to the joint that it follows; 1 if it follows none."""
+    unit: str
+    """Of its value: ``rad`` or ``m``."""
 
 
 @dataclass(frozen=True)
@@ -204,6 +206,7 @@ class Description:
             limits,
             float(stated.get("velocity", "inf")),
             1.0 if mimic is None else float(mimic.get("multiplier", "1")),
+            "m" if joint.get("type") == "prismatic" else "rad",
         )
 
     def _resolved(self, name: str) -> Path:

@@ -186,6 +186,14 @@ class Robot:
         fingers = (joint for arm in self.arms.values() for joint in arm.fingers.joints)
         return (*self.joint_names, *fingers)
 
+    def finger_values(self, moving: Array) -> dict[str, float]:
+        """The value of each hand's fingers in a row (m,) of all moving joints, by gripper."""
+        hands = {gripper: arm.fingers for gripper, arm in self.arms.items() if arm.fingers.joints}
+        return {
+            gripper: float(moving[fingers.slice.start] / fingers.ratios[0])
+            for gripper, fingers in hands.items()
+        }
+
     @cached_property
     def home(self) -> Array:
         """(n,) rad: all arms at their side."""

@@ -110,6 +110,11 @@ class PlacedRobot(BaseModel):
         return data | {name: data.get(name, value) for name, value in defaults.items()}
 
 
+def grasp_axis(size: tuple[float, float, float]) -> int:
+    """The box axis that fingers close along: the narrower horizontal one (0: x, 1: y)."""
+    return 0 if size[0] < size[1] else 1
+
+
 class Table(_Document):
     """A fixed support; ``position`` is the centre of its top (m), ``yaw`` in rad."""
 

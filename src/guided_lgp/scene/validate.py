@@ -5,9 +5,8 @@ from itertools import combinations
 import numpy as np
 
 from guided_lgp.errors import InputError
-from guided_lgp.scene import pr2
 from guided_lgp.scene.footprints import footprint, gap, inset
-from guided_lgp.scene.model import Box, Scene, Table
+from guided_lgp.scene.model import Box, Scene, Table, grasp_axis
 from guided_lgp.scene.reach import reachable_by_any
 from guided_lgp.scene.world import TABLE_THICKNESS, World
 
@@ -27,14 +26,11 @@ def validate_scene(scene: Scene, where: str = "scene") -> None:
         where: the file, for the message.
 
     Raises:
-        InputError: the first fault found: torso out of range, tables that overlap each other or
+        InputError: the first fault found: a joint out of range, tables that overlap each other or
             the robot, boxes that overlap, float, sink in, stand in a circle or beside their table,
-            are too wide for the fingers, too flat, or out of both arms' reach.
+            are too wide for the fingers, too flat, or out of all arms' reach.
     """
-    torso = scene.robot.torso
-    low, high = pr2.TORSO_LIMITS
-    if not low <= torso <= high:
-        raise InputError(f"{where}: robot.torso", f"{torso} m is out of range", f"{low} to {high}")
+    _validate_robot(scene, where)
     _validate_tables(scene, where)
     for index, box in enumerate(scene.boxes):
         _validate_box(scene, box, f"{where}: boxes.{index} ({box.name})")
@@ -43,9 +39,24 @@ def validate_scene(scene: Scene, where: str = "scene") -> None:
         if not reachable_by_any(scene, box):
             raise InputError(
                 f"{where}: boxes.{index} ({box.name})",
-                f"out of both arms' reach at {box.position}",
+                f"out of {_all_arms(scene)} reach at {box.position}",
                 "a position that a gripper can grasp at",
             )
+
+
+def _all_arms(scene: Scene) -> str:
+    names = {1: "the arm's", 2: "both arms'"}
+    return names.get(len(scene.robot.description.arms), "all arms'")
+
+
+def _validate_robot(scene: Scene, where: str) -> None:
+    robot, values = scene.robot.description, scene.robot.fixed_values
+    for name, fixed in robot.fixed_joints.items():
+        value, (low, high) = values[fixed.joint], fixed.limits
+        if not low <= value <= high:
+            unit = robot.description.joints[fixed.joint].unit
+            fault = f"{value} {unit} is out of range"
+            raise InputError(f"{where}: robot.{name}", fault, f"{low} to {high}")
 
 
 def _validate_tables(scene: Scene, where: str) -> None:
@@ -63,12 +74,13 @@ def _validate_tables(scene: Scene, where: str) -> None:
 
 
 def _validate_box(scene: Scene, box: Box, where: str) -> None:
-    width = box.size[pr2.grasp_axis(box.size)]
-    if not MIN_SIDE <= width <= pr2.GRASP_WIDTH:
+    width = box.size[grasp_axis(box.size)]
+    widest = max(arm.fingers.grasp_width for arm in scene.robot.description.arms.values())
+    if not MIN_SIDE <= width <= widest:
         raise InputError(
             f"{where}.size",
             f"the gripper cannot close across {width} m, the narrower horizontal side",
-            f"{MIN_SIDE} to {pr2.GRASP_WIDTH} m",
+            f"{MIN_SIDE} to {widest} m",
         )
     if box.size[2] < MIN_SIDE:
         fault = f"the box is too flat to grasp: {box.size[2]} m high"

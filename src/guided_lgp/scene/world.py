@@ -10,10 +10,9 @@ from weakref import finalize
 import numpy as np
 from numpy.typing import NDArray
 
-from guided_lgp.poses import Array, pose
-from guided_lgp.scene import pr2
+from guided_lgp.poses import Array, compose, pose
 from guided_lgp.scene.bullet import pybullet
-from guided_lgp.scene.model import GRIPPERS, Scene, Table
+from guided_lgp.scene.model import Scene, Table
 
 TABLE_THICKNESS = 0.04
 """Tables and trays are slabs (m) under their top; what holds them up is left out."""
@@ -82,9 +81,10 @@ class World:
         if self.client < 0:
             raise RuntimeError("PyBullet has no client left: close worlds that are not needed")
         self._free = finalize(self, pybullet.disconnect, physicsClientId=self.client)
-        base = pr2.base_pose(scene)
+        self._description = scene.robot.description
+        base = scene.robot.base_pose
         self.robot: int = pybullet.loadURDF(
-            str(pr2.urdf_path()),
+            str(self._description.urdf),
             basePosition=base[:3],
             baseOrientation=base[3:],
             useFixedBase=True,
@@ -92,21 +92,16 @@ class World:
             physicsClientId=self.client,
         )
         self.joints: dict[str, int] = {}
-        self.links: dict[str, int] = {}
+        self.links: dict[str, int] = {self._description.base_link: -1}
         for index in range(pybullet.getNumJoints(self.robot, physicsClientId=self.client)):
             info = pybullet.getJointInfo(self.robot, index, physicsClientId=self.client)
             self.joints[info[1].decode()] = index
             self.links[info[12].decode()] = index
-        self._moved = [
-            self.joints[joint]
-            for joint in (*pr2.ARM_JOINTS, *(j for g in GRIPPERS for j in pr2.FINGER_JOINTS[g]))
-        ]
-        pybullet.resetJointState(
-            self.robot,
-            self.joints["torso_lift_joint"],
-            scene.robot.torso,
-            physicsClientId=self.client,
-        )
+        self._moved = [self.joints[joint] for joint in self._description.moving_joints]
+        for joint, value in scene.robot.fixed_values.items():
+            pybullet.resetJointState(
+                self.robot, self.joints[joint], value, physicsClientId=self.client
+            )
         self.tables = {table.name: self._add_table(table) for table in scene.tables}
         self.boxes = {box.name: self._add_box(box.name, box.size) for box in scene.boxes}
         self._names: dict[tuple[int, int], str] = {
@@ -116,7 +111,7 @@ class World:
         self._parts = {name: part for part, name in self._names.items()}
         self._filter_pairs()
         self._dressed = False
-        self.set(pr2.HOME_CONFIGURATION, initial_poses(scene))
+        self.set(self._description.home, initial_poses(scene))
 
     def __enter__(self) -> Self:
         return self
@@ -139,14 +134,15 @@ class World:
         """Put the robot and the boxes somewhere, without simulation.
 
         Args:
-            q: configuration (14,) in rad.
+            q: configuration (n,) in rad.
             boxes: pose (7,) of each box that is to be moved.
-            fingers: value (rad) of the finger joints by gripper; open where not given.
+            fingers: value (rad or m) of the fingers by gripper; open where not given.
         """
         fingers = fingers or {}
         values = [[value] for value in np.asarray(q, float).tolist()]
-        for gripper in GRIPPERS:
-            values += 4 * [[float(fingers.get(gripper, pr2.FINGER_LIMITS[1]))]]
+        for gripper, arm in self._description.arms.items():
+            opened = fingers.get(gripper, arm.fingers.opened)
+            values += [[value] for value in (arm.fingers.ratios * opened).tolist()]
         pybullet.resetJointStatesMultiDof(
             self.robot, self._moved, values, physicsClientId=self.client
         )
@@ -186,6 +182,12 @@ class World:
             self.robot, indices, computeForwardKinematics=True, physicsClientId=self.client
         )
         return np.array([[*state[4], *state[5]] for state in states])
+
+    def tool_poses(self, grippers: Iterable[str]) -> Array:
+        """Poses (n, 7) of the grippers' tool frames in the world."""
+        arms = [self._description.arms[gripper] for gripper in grippers]
+        links = self.link_poses(arm.tool_link for arm in arms)
+        return compose(links, np.array([arm.tool_in_link for arm in arms]))
 
     def render(self, camera: Camera | None = None) -> NDArray[np.uint8]:
         """A picture (height, width, 3) of the world as it is, drawn without a graphics card."""
@@ -311,11 +313,15 @@ class World:
             for link, index in self.links.items()
             if pybullet.getCollisionShapeData(self.robot, index, physicsClientId=self.client)
         ]
-        arms = {link for g in GRIPPERS for link in (*pr2.ARM_LINKS[g], *pr2.HAND_LINKS[g])}
-        self.fixed_links = tuple(link for link in solid if link not in arms)
-        disabled = pr2.disabled_pairs()
+        moving = {
+            link
+            for arm in self._description.arms.values()
+            for link in (*arm.links, *arm.hand_links)
+        }
+        self.fixed_links = tuple(link for link in solid if link not in moving)
+        disabled = self._description.disabled_pairs
         for one, other in combinations(solid, 2):
-            if not {one, other} & arms or frozenset((one, other)) in disabled:
+            if not {one, other} & moving or frozenset((one, other)) in disabled:
                 self._ignore(self._parts[one], self._parts[other])
         for table in self.tables.values():
             for link in self.fixed_links:

@@ -1,4 +1,4 @@
-"""A scene in viser: the PR2 from its meshes, tables and boxes, each movable by name."""
+"""A scene in viser: the robot from its meshes, tables and boxes, each movable by name."""
 
 import io
 from collections.abc import Mapping
@@ -13,13 +13,6 @@ import viser
 
 from guided_lgp.poses import Array, compose, pose
 from guided_lgp.scene.model import Scene
-from guided_lgp.scene.pr2 import (
-    ARM_JOINTS,
-    HOME_CONFIGURATION,
-    TOOL_LINK,
-    base_pose,
-    urdf_path,
-)
 from guided_lgp.scene.world import COLOURS, TABLE_THICKNESS
 
 Colour = tuple[float, float, float]
@@ -39,7 +32,7 @@ class Viewer:
     """
 
     def __init__(self, scene: Scene, port: int = 8080) -> None:
-        """Start the server and draw the scene with both arms at their side.
+        """Start the server and draw the scene with all arms at their side.
 
         Args:
             scene: the scene to draw.
@@ -49,7 +42,8 @@ class Viewer:
         # viser announces itself on standard output, which belongs to our own results.
         with redirect_stdout(io.StringIO()):
             self.server = viser.ViserServer("127.0.0.1", port, scene.name, verbose=False)
-        self._model = pinocchio.buildModelFromUrdf(str(urdf_path()))
+        self._robot = scene.robot.description
+        self._model = pinocchio.buildModelFromUrdf(str(self._robot.urdf))
         self._data = self._model.createData()
         self._q = pinocchio.neutral(self._model)
         self._joints: dict[str, Any] = {}
@@ -57,7 +51,7 @@ class Viewer:
         self._add_surroundings()
         self._add_robot()
         self._add_tables_and_boxes()
-        self.configure(dict(zip(ARM_JOINTS, HOME_CONFIGURATION.tolist(), strict=True)))
+        self.configure(dict(zip(self._robot.joint_names, self._robot.home.tolist(), strict=True)))
 
     def __enter__(self) -> Self:
         return self
@@ -80,9 +74,11 @@ class Viewer:
 
     def tool_pose(self, gripper: str) -> Array:
         """Pose (7,) of the gripper's tool frame in the world, at the current configuration."""
-        frame = self._model.getFrameId(TOOL_LINK[gripper])
+        arm = self._robot.arms[gripper]
+        frame = self._model.getFrameId(arm.tool_link)
         placement = pinocchio.updateFramePlacement(self._model, self._data, frame)
-        return compose(base_pose(self.scene), np.array(pinocchio.SE3ToXYZQUAT(placement)))
+        link = compose(self.scene.robot.base_pose, np.array(pinocchio.SE3ToXYZQUAT(placement)))
+        return compose(link, arm.tool_in_link)
 
     def move_box(self, name: str, box_pose: Array) -> None:
         """Put a box at a pose (7,) in the world."""
@@ -99,33 +95,34 @@ class Viewer:
 
     def _add_robot(self) -> None:
         scene = self.server.scene
-        scene.add_frame("/pr2", show_axes=False, **_pose(base_pose(self.scene)))
-        self._q[self._model.joints[self._model.getJointId("torso_lift_joint")].idx_q] = (
-            self.scene.robot.torso
-        )
+        root = f"/{self._robot.name}"
+        scene.add_frame(root, show_axes=False, **_pose(self.scene.robot.base_pose))
+        for joint, value in self.scene.robot.fixed_values.items():
+            self._q[self._model.joints[self._model.getJointId(joint)].idx_q] = value
         pinocchio.forwardKinematics(self._model, self._data, self._q)
-        paths = ["/pr2"]
+        paths = [root]
         for index in range(1, self._model.njoints):
             name = self._model.names[index]
             paths.append(f"{paths[self._model.parents[index]]}/{name}")
             local = np.array(pinocchio.SE3ToXYZQUAT(self._data.liMi[index]))
             self._joints[name] = scene.add_frame(paths[index], show_axes=False, **_pose(local))
         visuals = pinocchio.buildGeomFromUrdf(
-            self._model, str(urdf_path()), pinocchio.GeometryType.VISUAL
+            self._model, str(self._robot.urdf), pinocchio.GeometryType.VISUAL
         )
+        hands = {link for arm in self._robot.arms.values() for link in arm.hand_links}
         for visual in visuals.geometryObjects:
             mesh = visual.geometry
             # The primitive shapes of the description mark sensor frames, a few mm wide.
             if not hasattr(mesh, "num_tris"):
                 continue
-            hand = "finger" in visual.name or "palm" in visual.name
+            link, _, _ = visual.name.rpartition("_")
             scene.add_mesh_simple(
                 f"{paths[visual.parentJoint]}/{visual.name}",
                 np.asarray(mesh.vertices()),
                 np.array(
                     [[mesh.tri_indices(i)[k] for k in range(3)] for i in range(mesh.num_tris)]
                 ),
-                color=_HAND if hand else _SHELL,
+                color=_HAND if link in hands else _SHELL,
                 flat_shading=True,
                 **_pose(np.array(pinocchio.SE3ToXYZQUAT(visual.placement))),
             )

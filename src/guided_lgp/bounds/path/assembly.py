@@ -7,7 +7,7 @@ import numpy as np
 from guided_lgp.bounds.path.motions import Motion
 from guided_lgp.bounds.path.situation import Attach, Fingers, Release, Situation, Step
 from guided_lgp.bounds.path.timing import INTERVAL
-from guided_lgp.bounds.results import JOINT_NAMES, Array, Attachment, Trajectory
+from guided_lgp.bounds.results import Array, Attachment, Trajectory
 from guided_lgp.scene import GRIPPERS
 from guided_lgp.scene.pr2 import ARM_JOINTS, FINGER_JOINTS, FINGER_VELOCITY, arm_slice
 
@@ -57,7 +57,8 @@ def assemble(start: Situation, steps: Iterable[Step]) -> Trajectory:
             times.append(times[-1][-1] + clock[1:])
             count += len(block)
     attachments += [Attachment(b, gripper, i, count - 1) for b, (gripper, i) in open_since.items()]
-    return Trajectory(JOINT_NAMES, np.concatenate(times), np.concatenate(rows), tuple(attachments))
+    names = (*ARM_JOINTS, *(joint for g in GRIPPERS for joint in FINGER_JOINTS[g]))
+    return Trajectory(names, np.concatenate(times), np.concatenate(rows), tuple(attachments))
 
 
 def _finger_slice(gripper: str) -> slice:

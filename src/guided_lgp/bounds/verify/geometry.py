@@ -5,10 +5,12 @@ that is many times faster than arrays.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
-from guided_lgp.scene import Scene, pr2
+from guided_lgp.robots import Robot
+from guided_lgp.scene import Scene
+from guided_lgp.scene.model import grasp_axis
 from guided_lgp.scene.world import MARGIN, Penetration
 
 GRASP_OFFSET = 0.003
@@ -79,12 +81,22 @@ def angle_of(cosine: float) -> float:
     return math.acos(max(-1.0, min(1.0, cosine)))
 
 
-def grasp_faults(box: str, size: Vector, placement: Pose, tool: Pose) -> list[Violation]:
-    """Whether the gripper is at the box: closing across it, fingertips on it, palm outside."""
+def grasp_faults(
+    box: str, size: Vector, placement: Pose, tool: Pose, palm_front: float
+) -> list[Violation]:
+    """Whether the gripper is at the box: closing across it, fingertips on it, palm outside.
+
+    Args:
+        box: its name.
+        size: its extents (m).
+        placement: its pose.
+        tool: pose of the gripper's tool frame.
+        palm_front: x of the palm's front in the tool frame (m).
+    """
     approach, closing, _ = axes_of(tool)
     sides = axes_of(placement)
     offset = offset_of(tool, placement)
-    across = pr2.grasp_axis(size)
+    across = grasp_axis(size)
     excess = [
         angle_of(abs(dot(closing, sides[across]))) - GRASP_ANGLE,
         abs(dot(offset, closing)) - GRASP_OFFSET,
@@ -94,7 +106,7 @@ def grasp_faults(box: str, size: Vector, placement: Pose, tool: Pose) -> list[Vi
         reach -= size[axis] / 2 * abs(dot(approach, sides[axis]))
         if axis != across:
             excess.append(abs(dot(offset, sides[axis])) - (size[axis] / 2 - GRASP_INSET))
-    excess.append(pr2.PALM_FRONT - MARGIN - reach)
+    excess.append(palm_front - MARGIN - reach)
     worst = max(excess)
     return [Violation(f"grasp {box}", worst)] if worst > 0 else []
 
@@ -153,11 +165,23 @@ def _centre_of_mass(
     return x, y, z
 
 
-def declared(overlap: Penetration, held: Mapping[str, str], support: Mapping[str, str]) -> bool:
-    """Whether two bodies may touch: hand and held box, box and its support."""
+def declared(
+    overlap: Penetration,
+    robot: Robot,
+    held: Collection[tuple[str, str]],
+    support: Mapping[str, str],
+) -> bool:
+    """Whether two bodies may touch: hand and held box, box and its support.
+
+    Args:
+        overlap: of the two bodies.
+        robot: whose hands they may be.
+        held: pairs of a box and a gripper that may touch it.
+        support: what each box stands on.
+    """
     for one, other in ((overlap.first, overlap.second), (overlap.second, overlap.first)):
         if support.get(one) == other:
             return True
-        if one in held and other in pr2.HAND_LINKS[held[one]]:
+        if any(one == box and other in robot.arms[g].hand_links for box, g in held):
             return overlap.depth <= HAND_DEPTH
     return False

@@ -18,7 +18,7 @@ from guided_lgp.bounds.verify.geometry import (
     placement_faults,
 )
 from guided_lgp.logic import Action, Skeleton, State, successor
-from guided_lgp.scene import GRIPPERS, pr2
+from guided_lgp.robots import Robot
 from guided_lgp.scene.world import World, initial_poses
 
 RIGID_POSITION, RIGID_ANGLE = 0.001, 0.01
@@ -35,36 +35,37 @@ def verify_keyframe(
         world: of the scene.
         keyframe: arms and boxes.
         state: who holds what and what stands where; with an action, before it.
-        action: for a contact keyframe, the action whose switch it is: the acting gripper is at
-            the box, which stands on its support. Its fingers are checked open, as they are
-            shortly before a grasp and after a place.
+        action: for a contact keyframe, the action whose switch it is: the box is where it
+            changes over. Hands that close or open then are checked open, as they are shortly
+            before a grasp and after a place.
 
     Returns:
         What is violated; nothing if the keyframe is good.
     """
     after = state if action is None else successor(state, action)
-    held = dict(state.held) | dict(after.held)
+    held = tuple(dict.fromkeys((*state.held, *after.held)))
     support = dict(state.support) | dict(after.support)
-    sizes = box_sizes(world.scene)
+    sizes, robot = box_sizes(world.scene), world.scene.robot.description
     boxes = {name: keyframe.boxes[name].tolist() for name in sizes}
     if not math.isfinite(sum(map(sum, boxes.values()))):
         return [Violation("finite pose", math.nan)]
-    violations = joint_limit_faults(keyframe.q)
+    violations = joint_limit_faults(robot, keyframe.q)
     fingers = {
-        gripper: pr2.finger_joint(min(sizes[box][:2]))
-        for box, gripper in held.items()
-        if action is None or box != action.box
+        gripper: robot.arms[gripper].fingers.value(min(sizes[box][:2]))
+        for box, gripper in held
+        if (box, gripper) in state.held and (box, gripper) in after.held
     }
     world.set(keyframe.q, keyframe.boxes, fingers)
     if held:
-        tools = world.link_poses(pr2.TOOL_LINK[gripper] for gripper in held.values()).tolist()
-        for box, tool in zip(held, tools, strict=True):
-            violations += grasp_faults(box, sizes[box], boxes[box], tool)
+        tools = world.tool_poses(gripper for _, gripper in held).tolist()
+        for (box, gripper), tool in zip(held, tools, strict=True):
+            palm_front = robot.arms[gripper].palm_front
+            violations += grasp_faults(box, sizes[box], boxes[box], tool, palm_front)
     violations += placement_faults(world.scene, boxes, support)
     violations += [
         Violation(f"collision {overlap.first} {overlap.second}", overlap.depth)
         for overlap in world.penetrations()
-        if not declared(overlap, held, support)
+        if not declared(overlap, robot, held, support)
     ]
     return violations
 
@@ -92,18 +93,18 @@ def verify_keyframes(
         The first violation with its action, or None.
     """
     state = world.scene.state
-    start = Keyframe(pr2.HOME_CONFIGURATION, initial_poses(world.scene))
+    start = Keyframe(world.scene.robot.description.home, initial_poses(world.scene))
     for action in skeleton[:verified]:
         state = successor(state, action)
     before = after_action[verified - 1] if verified else start
     world.set(before.q, before.boxes)
-    last = _Modes(world, before)
+    last = _Frames(world, before)
     for index, action in enumerate(skeleton[verified:], verified):
         after = successor(state, action)
         moves = ((at_switch[index], state, action), (after_action[index], after, None))
         for keyframe, modes, contact in moves:
             found = verify_keyframe(world, keyframe, modes, contact)
-            reached = _Modes(world, keyframe)
+            reached = _Frames(world, keyframe)
             found = found or _slips(last, reached, modes)
             if found:
                 return Violation(found[0].constraint, found[0].amount, index)
@@ -112,24 +113,26 @@ def verify_keyframes(
     return None
 
 
-def joint_limit_faults(q: Array) -> list[Violation]:
-    """Joints of a configuration (14,) outside their limits."""
-    excess = np.maximum(pr2.JOINT_LIMITS[:, 0] - q, q - pr2.JOINT_LIMITS[:, 1])
+def joint_limit_faults(robot: Robot, q: Array) -> list[Violation]:
+    """Joints of a configuration (n,) outside their limits."""
+    limits = robot.position_limits
+    excess = np.maximum(limits[:, 0] - q, q - limits[:, 1])
     if not excess.max() <= LIMIT_TOLERANCE:  # also if not a number
         return [
-            Violation(f"joint limit {pr2.ARM_JOINTS[index]}", float(excess[index]))
+            Violation(f"joint limit {robot.joint_names[index]}", float(excess[index]))
             for index in range(len(excess))
             if not excess[index] <= LIMIT_TOLERANCE
         ]
     return []
 
 
-class _Modes:
+class _Frames:
     """Where boxes and tools are in a keyframe that the world has just been set to."""
 
     def __init__(self, world: World, keyframe: Keyframe) -> None:
-        tools = world.link_poses(pr2.TOOL_LINK[gripper] for gripper in GRIPPERS).tolist()
-        self.frames: dict[str, list[float]] = dict(zip(GRIPPERS, tools, strict=True))
+        grippers = world.scene.robot.description.grippers
+        tools = world.tool_poses(grippers).tolist()
+        self.frames: dict[str, list[float]] = dict(zip(grippers, tools, strict=True))
         self.boxes = {name: placement.tolist() for name, placement in keyframe.boxes.items()}
         self.frames |= self.boxes
 
@@ -144,7 +147,7 @@ class _Modes:
         return position, [dot(side, axis) for side in axes_of(placement) for axis in axes]
 
 
-def _slips(last: _Modes, reached: _Modes, state: State) -> list[Violation]:
+def _slips(last: _Frames, reached: _Frames, state: State) -> list[Violation]:
     """Boxes that moved relative to what holds or supports them in this mode."""
     found = []
     for box, carrier in (*state.held, *state.support):
