@@ -8,7 +8,7 @@ INSTALLED := $(VENV)/.installed
 export PATH := $(BIN):$(PATH)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: setup ship repro study test lint bench mlflow verify-determinism verify-interruption verify-load
+.PHONY: setup ship quick repro study test lint bench mlflow verify-determinism verify-interruption verify-load
 
 setup: $(INSTALLED)
 
@@ -30,14 +30,23 @@ repro: setup
 	git rev-parse --git-dir > /dev/null 2>&1 || dvc config --local core.no_scm true
 	dvc repro
 	-guided-lgp mlflow sync
-	python -m guided_lgp.report.readme
+	python -m guided_lgp.report.pages
+
+# The whole pipeline with small numbers, in a clone of its own, which is made anew.
+quick: setup
+	rm -rf quick
+	git clone -q . quick
+	cp tests/params.yaml quick
+	rm quick/dvc.lock
+	cd quick && MLFLOW_TRACKING_URI=sqlite:///mlflow.db dvc repro
+	@echo "Report: quick/reports/report.html"
 
 # Spread over draws, ablations, data efficiency: policies of their own, on the data of `repro`. The
 # report shows the spread but cannot depend on it, or `dvc repro` would run the studies.
 study: setup
 	dvc repro studies/dvc.yaml
 	dvc repro -f -s render_reports
-	python -m guided_lgp.report.readme
+	python -m guided_lgp.report.pages
 
 test: lint
 	pytest -n auto --dist loadfile

@@ -179,7 +179,7 @@ def _dask_client(workers: int) -> Any:
         raise InputError(
             "params.yaml: parallel.backend",
             "dask is not installed",
-            "loky, or install the extra: pip install 'guided-lgp[dask]'",
+            "loky, or install the extra: pip install 'guided-lgp[cluster]'",
         ) from None
     address = os.environ.get(SCHEDULER_VARIABLE)
     if not address:

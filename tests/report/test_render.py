@@ -12,7 +12,7 @@ from guided_lgp.errors import InputError
 from guided_lgp.params import Params
 from guided_lgp.paths import METRICS
 from guided_lgp.report import render
-from guided_lgp.report.readme import readme_block
+from guided_lgp.report.pages import BEGIN, END, winners, write_pages
 
 FIGURES = {"headline", "scalability", "success", "learning_curves", "confusion"}
 FIGURES |= {"feasible_share", "failures"}
@@ -117,13 +117,40 @@ def test_training_metrics(rendered: Path) -> None:
     assert {"accuracy", "loss", "epochs"} <= table["by_configuration"].keys()
 
 
-def test_readme_block_holds_the_tables(rendered: Path, tmp_path: Path) -> None:
-    block = readme_block(rendered)
-    assert block.count("**Table I") == 3
-    assert "K = 20: e.10" in block
-    assert block.startswith("- Paper's networks: shortest solutions")
-    with pytest.raises(InputError, match="render_reports"):
-        readme_block(tmp_path)
+def test_pages_hold_the_tables_and_the_findings(rendered: Path, tmp_path: Path) -> None:
+    shutil.copytree(rendered, tmp_path / "clone")
+    readme = tmp_path / "clone/README.md"
+    readme.write_text(f"# Title\n\n{BEGIN}\nold\n{END}\n\nThe rest.\n")
+    for _ in range(2):
+        write_pages(tmp_path / "clone")
+    text = readme.read_text()
+    assert text.startswith(f"# Title\n\n{BEGIN}\n\n**1. ")
+    assert text.endswith(f"\n{END}\n\nThe rest.\n")
+    assert "old" not in text
+    assert (tmp_path / "clone/docs/images/solved.png").is_file()
+    results = (tmp_path / "clone/docs/results.md").read_text()
+    assert results.count("**Table I") >= 3
+    assert "K = 20: e.10" in results
+    readme.write_text("# Title\n")
+    with pytest.raises(InputError, match="markers"):
+        write_pages(tmp_path / "clone")
+    with pytest.raises(InputError, match="compare_scalability"):
+        write_pages(tmp_path)
+
+
+def test_who_wins_is_who_is_first_of_those_that_solve_all() -> None:
+    def cell(nodes: float, solved: int = 2) -> dict[str, float]:
+        return {"problems": 2, "problems_solved": solved, "tree_size_mean": nodes}
+
+    def times(seconds: float) -> dict[str, float]:
+        return {"symbolic_s": seconds, "policy_s": 0.0, "coarse_s": 0.0, "path_s": 9.0}
+
+    table = winners(
+        {"a.1": {"astar": cell(10), "guided": cell(12), "relational": cell(5, solved=1)}},
+        {"a.1": {"astar": times(0.2), "guided": times(0.2), "relational": times(0.1)}},
+    )
+    (row,) = table.rows
+    assert row == ("a.1", "4", "2 of 3", "A*: 10.0", "A*; Guided: 0.20")
 
 
 def test_rendering_again_gives_the_same_bytes_and_other_figures_are_optional(

@@ -12,19 +12,25 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from guided_lgp.documents import written_whole
-from guided_lgp.experiments.problems import ProblemClass
+from guided_lgp.experiments.problems import Problem
 from guided_lgp.report import paper
 from guided_lgp.report.inputs import Metrics, all_solved, compared
-from guided_lgp.report.style import POLICIES, POLICY_COLORS, planner_style
+from guided_lgp.report.style import (
+    PLANNER_STYLES,
+    PLANNERS,
+    POLICIES,
+    POLICY_COLORS,
+    RIVALS,
+    VARIANTS,
+)
 from guided_lgp.report.tables import search_time
-from guided_lgp.search.planners import RIVALS, TABLE_1, TABLE_3
 
 COLUMN = 3.45
 """Width of a column of a two-column page (in)."""
 PAGE = 7.1
 """Width of both columns (in)."""
 
-_STYLE: dict[Any, Any] = {
+STYLE: dict[Any, Any] = {
     "font.family": "STIXGeneral",
     "mathtext.fontset": "stix",
     "font.size": 9.0,
@@ -48,6 +54,7 @@ _STYLE: dict[Any, Any] = {
     "svg.hashsalt": "guided-lgp",
     "savefig.dpi": 200,
 }
+"""Matplotlib's settings for every figure."""
 
 OUTCOMES = {
     "shortest": ("Shortest", "#0072B2"),
@@ -56,7 +63,7 @@ OUTCOMES = {
 }
 
 
-@mpl.rc_context(_STYLE)
+@mpl.rc_context(STYLE)
 def save(figure: Figure, folder: Path, name: str) -> None:
     """Write ``name.png`` and ``name.svg``; the same figure gives the same bytes."""
     with written_whole(folder / f"{name}.png") as file:
@@ -98,7 +105,7 @@ def _quantities(metrics: Metrics, timing: Metrics) -> tuple[Quantity, Quantity, 
     )
 
 
-@mpl.rc_context(_STYLE)
+@mpl.rc_context(STYLE)
 def headline(metrics: Metrics, timing: Metrics, limit: int) -> Figure:
     """Tree size and time against K, one curve per planner, with the paper's points.
 
@@ -121,7 +128,7 @@ def headline(metrics: Metrics, timing: Metrics, limit: int) -> Figure:
     return figure
 
 
-@mpl.rc_context(_STYLE)
+@mpl.rc_context(STYLE)
 def scalability(metrics: Metrics, timing: Metrics, limit: int) -> Figure:
     """Tree size and times against the smallest number of actions, by type of problem.
 
@@ -130,7 +137,7 @@ def scalability(metrics: Metrics, timing: Metrics, limit: int) -> Figure:
         timing: as ``metrics``.
         limit: of the tree size.
     """
-    panels: dict[str, list[ProblemClass]] = {}
+    panels: dict[str, list[Problem]] = {}
     for problem in compared(metrics):
         panels.setdefault(problem.target.split()[0], []).append(problem)
     quantities = _quantities(metrics, timing)
@@ -159,11 +166,11 @@ _PANELS = {"stack": "Stack boxes", "place": "Place boxes side by side"}
 """Titles of problems by the first word of their target; of others, the target itself."""
 
 
-def _widths(panels: Mapping[str, Sequence[ProblemClass]]) -> list[int]:
+def _widths(panels: Mapping[str, Sequence[Problem]]) -> list[int]:
     return [len({problem.k_min for problem in problems}) for problems in panels.values()]
 
 
-def _log_axes(axis: Axes, problems: Sequence[ProblemClass]) -> None:
+def _log_axes(axis: Axes, problems: Sequence[Problem]) -> None:
     axis.set_xscale("log")
     axis.set_yscale("log")
     lengths = sorted({problem.k_min for problem in problems})
@@ -173,7 +180,7 @@ def _log_axes(axis: Axes, problems: Sequence[ProblemClass]) -> None:
 
 def _against_k(
     axis: Axes,
-    problems: Sequence[ProblemClass],
+    problems: Sequence[Problem],
     quantity: Quantity,
     metrics: Metrics,
     spread: bool = True,
@@ -182,10 +189,10 @@ def _against_k(
 
     A white dot marks the mean of a planner that leaves problems of that K unsolved.
     """
-    for rank, (planner, row) in enumerate(TABLE_3.items()):
-        style: dict[str, Any] = planner_style(row)
+    for rank, (planner, name) in enumerate(PLANNERS.items()):
+        style: dict[str, Any] = PLANNER_STYLES[planner]
         # Side by side, so that equal figures do not hide each other.
-        side = rank - (len(TABLE_3) - 1) / 2
+        side = rank - (len(PLANNERS) - 1) / 2
         known: dict[int, list[Mapping[str, Any]]] = {}
         for problem in problems:
             cell = quantity.source[problem.name].get(planner)
@@ -202,9 +209,7 @@ def _against_k(
             )
             # On a log axis an error bar cannot reach zero.
             bars = (np.minimum(errors, 0.9 * values), errors) if spread else None
-            axis.errorbar(
-                lengths, values, bars, elinewidth=0.7, capsize=1.5, label=row.label, **style
-            )
+            axis.errorbar(lengths, values, bars, elinewidth=0.7, capsize=1.5, label=name, **style)
             partial = [
                 any(
                     not all_solved(metrics[p.name][planner])
@@ -229,12 +234,12 @@ def _against_k(
                 markersize=8,
                 markeredgewidth=0.9,
                 linestyle="none",
-                label=f"{row.label} (paper)",
+                label=f"{name} (paper)",
                 zorder=1.5,
             )
 
 
-def _limit(axis: Axes, problems: Sequence[ProblemClass], metrics: Metrics, limit: int) -> None:
+def _limit(axis: Axes, problems: Sequence[Problem], metrics: Metrics, limit: int) -> None:
     """Mark the limit of the tree size, and which planners without a policy met it where."""
     axis.axhline(limit, color="#999999", linewidth=0.8, linestyle=":")
     for planner in RIVALS:
@@ -244,7 +249,7 @@ def _limit(axis: Axes, problems: Sequence[ProblemClass], metrics: Metrics, limit
             stopped,
             [limit] * len(stopped),
             "x",
-            color=planner_style(TABLE_3[planner])["color"],
+            color=PLANNER_STYLES[planner]["color"],
             markersize=6,
         )
 
@@ -253,12 +258,12 @@ def _planner_legend(figure: Figure, axes: np.ndarray) -> None:
     handles: dict[str, Any] = {}
     for axis in axes.flat:
         handles = dict(zip(*reversed(axis.get_legend_handles_labels()), strict=True)) | handles
-    labels = [f"{row.label}{origin}" for row in TABLE_3.values() for origin in ("", " (paper)")]
+    labels = [f"{name}{origin}" for name in PLANNERS.values() for origin in ("", " (paper)")]
     shown = [label for label in labels if label in handles]
     figure.legend([handles[label] for label in shown], shown, loc="outside lower center", ncols=4)
 
 
-@mpl.rc_context(_STYLE)
+@mpl.rc_context(STYLE)
 def success(problems: pd.DataFrame) -> Figure:
     """Shares of outcomes by type of objective, one panel per planner.
 
@@ -266,9 +271,9 @@ def success(problems: pd.DataFrame) -> Figure:
         problems: columns planner, kind (type of objective) and outcome, one row per problem
             that is not satisfied at the start.
     """
-    planners = [name for name in TABLE_1 if name in set(problems["planner"])]
-    policies = list(dict.fromkeys(TABLE_1[name].policy for name in planners))
-    rows_of = [[n for n in planners if TABLE_1[n].policy == policy] for policy in policies]
+    planners = [name for name in VARIANTS if name in set(problems["planner"])]
+    policies = list(dict.fromkeys(VARIANTS[name].policy for name in planners))
+    rows_of = [[n for n in planners if VARIANTS[n].policy == policy] for policy in policies]
     kinds = sorted(set(problems["kind"]), key=lambda kind: (kind.count("+"), kind))
     figure, axes = _subplots(
         len(policies),
@@ -281,7 +286,7 @@ def success(problems: pd.DataFrame) -> Figure:
     for axis in axes.flat:
         axis.set_visible(False)
     for planner in planners:
-        variant = TABLE_1[planner]
+        variant = VARIANTS[planner]
         number = policies.index(variant.policy)
         place = rows_of[number].index(planner)
         axis = axes[number][place]
@@ -301,7 +306,7 @@ def success(problems: pd.DataFrame) -> Figure:
                 height=0.72,
             )
             left += column.to_numpy()
-        axis.set_title(f"{POLICIES[variant.policy]}:\n{variant.strategy}")
+        axis.set_title(f"{POLICIES[variant.policy]}:\n{variant.search}")
         axis.set_yticks(
             range(len(kinds)), [f"{kind} (n = {counts.get(kind, 0)})" for kind in kinds]
         )
@@ -316,7 +321,7 @@ def success(problems: pd.DataFrame) -> Figure:
     return figure
 
 
-@mpl.rc_context(_STYLE)
+@mpl.rc_context(STYLE)
 def learning_curves(curves: Mapping[str, Mapping[str, Mapping[str, Sequence[float]]]]) -> Figure:
     """Loss and accuracy by epoch of every sub-policy.
 
@@ -354,7 +359,7 @@ _SPLITS: dict[str, dict[str, Any]] = {
 }
 
 
-@mpl.rc_context(_STYLE)
+@mpl.rc_context(STYLE)
 def confusion(matrices: Mapping[str, Mapping[str, tuple[Sequence[str], np.ndarray]]]) -> Figure:
     """Confusion of every sub-policy: rows the action of the data, columns the one predicted.
 
@@ -381,7 +386,7 @@ def confusion(matrices: Mapping[str, Mapping[str, tuple[Sequence[str], np.ndarra
     return figure
 
 
-@mpl.rc_context(_STYLE)
+@mpl.rc_context(STYLE)
 def feasible_share(shares: pd.DataFrame) -> Figure:
     """Share of sequences that stay feasible with one more action, by its arm and table.
 
@@ -411,7 +416,7 @@ def feasible_share(shares: pd.DataFrame) -> Figure:
     return figure
 
 
-@mpl.rc_context(_STYLE)
+@mpl.rc_context(STYLE)
 def failures(counts: pd.DataFrame) -> Figure:
     """Which constraint stays violated, by the action at which it does.
 

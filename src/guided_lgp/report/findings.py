@@ -3,13 +3,12 @@
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 
-from guided_lgp.experiments.problems import ProblemClass
+from guided_lgp.experiments.problems import Problem
 from guided_lgp.report import paper
 from guided_lgp.report.analysis import NEW, RENAMED, SEEN
 from guided_lgp.report.inputs import Metrics, all_solved, compared
-from guided_lgp.report.style import POLICIES
+from guided_lgp.report.style import GUIDED, PLANNERS, POLICIES, RIVALS, VARIANTS
 from guided_lgp.report.tables import number, percent, search_time
-from guided_lgp.search.planners import GUIDED, RIVALS, TABLE_1, TABLE_3
 
 AIM_SPEEDUP = 50
 """How much faster than breadth-first guided search should be on the longest problem that
@@ -25,17 +24,17 @@ def generalization(metrics: Metrics, calls: Mapping[str, float]) -> list[str]:
     """
     sentences = []
     for policy, name in POLICIES.items():
-        variants = [v for v in TABLE_1 if v in metrics and TABLE_1[v].policy == policy]
+        variants = [v for v in VARIANTS if v in metrics and VARIANTS[v].policy == policy]
         if not variants:
             continue
         parts = [
-            f"{_shortest(metrics[v])} ({TABLE_1[v].strategy}; "
+            f"{_shortest(metrics[v])} ({VARIANTS[v].search}; "
             f"{percent(metrics[v]['all']['no_solution'])} without a solution{_calls(calls.get(v))})"
             for v in variants
         ]
         sentences.append(f"{name}: shortest solutions, all / unseen objectives: {_join(parts)}.")
     missed = [
-        f"{TABLE_1[v].strategy}, {subset}: {percent(metrics[v][subset]['shortest'])} against "
+        f"{VARIANTS[v].search}, {subset}: {percent(metrics[v][subset]['shortest'])} against "
         f"{percent(printed[subset]['shortest'])}"
         for v, printed in paper.GENERALIZATION.items()
         if v in metrics
@@ -158,7 +157,7 @@ def _solved(metrics: Metrics) -> Iterator[str]:
         (beyond, "problems of 6 to 10 boxes"),
     ):
         complete, partial = [], []
-        for planner, row in TABLE_3.items():
+        for planner, label in PLANNERS.items():
             cells = {
                 p.name: metrics[p.name][planner] for p in problems if planner in metrics[p.name]
             }
@@ -168,16 +167,16 @@ def _solved(metrics: Metrics) -> Iterator[str]:
                 if not all_solved(cell)
             ]
             if cells and not missing:
-                complete.append(row.label)
+                complete.append(label)
             elif planner in GUIDED and missing:
-                partial.append(f"{row.label} solves {_join(missing)}")
+                partial.append(f"{label} solves {_join(missing)}")
         if complete:
             yield f"All {which} are solved, with a verified path, by {_join(complete)}."
         if partial:
             yield f"Not all {which}: {'; '.join(partial)}."
 
 
-def _printed_and_beyond(metrics: Metrics) -> tuple[list[ProblemClass], list[ProblemClass]]:
+def _printed_and_beyond(metrics: Metrics) -> tuple[list[Problem], list[Problem]]:
     """The problems of which the paper prints figures, and the others."""
     problems = compared(metrics)
     return (
@@ -196,8 +195,7 @@ def _many_boxes(metrics: Metrics, timing: Metrics) -> Iterator[str]:
     own = [cell["relational"] for cell in cells]
     seconds = [search_time(timing[problem.name]["relational"]) for problem in problems]
     solved = [
-        f"{TABLE_3[planner].label} solves "
-        f"{_join([str(c[planner]['problems_solved']) for c in cells])}"
+        f"{PLANNERS[planner]} solves {_join([str(c[planner]['problems_solved']) for c in cells])}"
         for planner in ("relational", *RIVALS)
         if all(planner in cell for cell in cells)
     ]
@@ -260,7 +258,7 @@ def _beaten(metrics: Metrics, figures: Mapping[str, Mapping[str, float | None]])
         parts = [f"Guided on {_join(wins)}"] if wins else []
         parts += [f"every guided planner on {_join(best)}"] if best else []
         if parts:
-            yield f"{TABLE_3[rival].label} (than {', than '.join(parts)})"
+            yield f"{PLANNERS[rival]} (than {', than '.join(parts)})"
 
 
 def _join(parts: list[str]) -> str:

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
@@ -14,20 +13,8 @@ from guided_lgp.robots.document import FixedJoint
 from guided_lgp.robots.kinematics import Kinematics
 
 
-class Gap(Protocol):
-    """How far two fingers are apart, over the value of their joints."""
-
-    def gap(self, value: float) -> float:
-        """Distance (m) at a value (rad or m)."""
-        ...
-
-    def value(self, gap: float) -> float:
-        """Value at a distance (m)."""
-        ...
-
-
 @dataclass(frozen=True)
-class TurningGap:
+class Gap:
     """Distance of two fingertips that turn together: ``sine sin a + cosine cos a + offset`` (m)."""
 
     sine: float

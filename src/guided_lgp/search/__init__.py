@@ -1,4 +1,9 @@
-"""Planners: one row each in :mod:`guided_lgp.search.planners`, all on the same two bounds.
+"""Planners: one module each, all on the same two bounds and, where guided, the same policy.
 
-A search is a function ``plan(problem: Problem) -> SearchResult``.
+Every planner is a function ``plan(scene, objective, symbols, bounds, ..., limits)`` that returns a
+:class:`SearchResult`.
 """
+
+from guided_lgp.search.result import SearchResult
+
+__all__ = ["SearchResult"]

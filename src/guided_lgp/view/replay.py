@@ -1,8 +1,9 @@
 """A plan as a self-contained 3D page: viser's recording, played back in a browser."""
 
 import html
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
@@ -42,29 +43,50 @@ def replay_html(trajectory: Trajectory, scene: Scene, path: Path) -> None:
     write_text(path, page.replace("<title>Viser</title>", title, 1))
 
 
-def play(viewer: Viewer, trajectory: Trajectory) -> Iterator[float]:
-    """Move the viewer's scene through a motion, from its first to its last configuration.
+class Stage(Protocol):
+    """What shows a motion: the 3D viewer, or whatever else has a robot and boxes to move."""
+
+    @property
+    def scene(self) -> Scene:
+        """The scene that is shown."""
+        ...
+
+    def configure(self, joints: Mapping[str, float]) -> None:
+        """Set joint values (rad) by name."""
+        ...
+
+    def tool_pose(self, gripper: str) -> Array:
+        """Pose (7,) of the gripper's tool frame in the world."""
+        ...
+
+    def move_box(self, name: str, box_pose: Array) -> None:
+        """Put a box at a pose (7,) in the world."""
+        ...
+
+
+def play(stage: Stage, trajectory: Trajectory) -> Iterator[float]:
+    """Move a scene through a motion, from its first to its last configuration.
 
     The boxes start where the scene has them.
 
     Yields:
         After each frame, the time (s) until the next one.
     """
-    boxes = {box.name: pose(box.position, box.yaw) for box in viewer.scene.boxes}
+    boxes = {box.name: pose(box.position, box.yaw) for box in stage.scene.boxes}
     for name, start in boxes.items():
-        viewer.move_box(name, start)
+        stage.move_box(name, start)
     grasps: dict[int, Array] = {}
     shown = _frames(trajectory)
     for step, index in enumerate(shown):
-        viewer.configure(dict(zip(trajectory.joint_names, trajectory.q[index], strict=True)))
+        stage.configure(dict(zip(trajectory.joint_names, trajectory.q[index], strict=True)))
         for number, attachment in enumerate(trajectory.attachments):
             if not attachment.start <= index <= attachment.end:
                 continue
-            tool = viewer.tool_pose(attachment.gripper)
+            tool = stage.tool_pose(attachment.gripper)
             if index == attachment.start:
                 grasps[number] = compose(inverse(tool), boxes[attachment.box])
             boxes[attachment.box] = compose(tool, grasps[number])
-            viewer.move_box(attachment.box, boxes[attachment.box])
+            stage.move_box(attachment.box, boxes[attachment.box])
         if step + 1 < len(shown):
             yield float(trajectory.times[shown[step + 1]] - trajectory.times[index])
 

@@ -1,0 +1,99 @@
+"""README and documentation: every command runs as written, the site builds without a warning."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PAGES = sorted(
+    page
+    for page in (ROOT / "README.md", *(ROOT / "docs").glob("*.md"))
+    if re.search(r"^guided-lgp ", page.read_text(encoding="utf-8"), flags=re.MULTILINE)
+)
+SERVER = "guided-lgp view"
+"""A command that serves until it is interrupted."""
+ENVIRONMENT = os.environ | {
+    "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+}
+
+
+def blocks(page: Path) -> Iterator[tuple[str, str]]:
+    """Language and content of the code blocks."""
+    text = page.read_text(encoding="utf-8")
+    yield from re.findall(r"^```(\w+)\n(.*?)^```", text, flags=re.DOTALL | re.MULTILINE)
+
+
+def run(command: str, folder: Path) -> str:
+    """What a command or script prints; it must succeed."""
+    done = subprocess.run(
+        ["bash", "-euc", command],
+        cwd=folder,
+        env=ENVIRONMENT,
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        check=False,
+        timeout=300,
+    )
+    assert done.returncode == 0, f"{command}\n{done.stdout}"
+    return done.stdout
+
+
+def serve(command: str, folder: Path) -> str:
+    """What a server prints before it is interrupted; it must end well."""
+    with subprocess.Popen(
+        ["bash", "-euc", f"exec {command}"],
+        cwd=folder,
+        env=ENVIRONMENT | {"PYTHONUNBUFFERED": "1"},
+        text=True,
+        stdout=subprocess.PIPE,
+    ) as process:
+        assert process.stdout is not None
+        line = process.stdout.readline()
+        process.send_signal(signal.SIGINT)
+        assert process.wait(60) == 0
+    return line
+
+
+def without_figures(text: str) -> str:
+    """The text with every decimal number replaced: times differ."""
+    return re.sub(r"\d+\.\d+", "#", text)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_commands_run_as_written(page: Path, tmp_path: Path) -> None:
+    printed = ""
+    for language, content in blocks(page):
+        match language:
+            case "json":
+                (tmp_path / "scene.json").write_text(content)
+            case "python":
+                (tmp_path / "script.py").write_text(content)
+                printed = run("python script.py", tmp_path)
+            case "sh" if content.startswith(SERVER):
+                assert serve(content.strip(), tmp_path).startswith("http://127.0.0.1:")
+            case "sh" if content.startswith("guided-lgp "):
+                printed = run(content, tmp_path)
+            case "text":
+                assert without_figures(printed) == without_figures(content)
+
+
+def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "-q", "-d", str(tmp_path)]
+    done = subprocess.run(
+        command,
+        cwd=ROOT,
+        env=ENVIRONMENT | {"NO_MKDOCS_2_WARNING": "1"},
+        text=True,
+        capture_output=True,
+        check=False,
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "schemas" / "scene.schema.json").is_file()
