@@ -17,7 +17,7 @@ from guided_lgp import tracking
 from guided_lgp.errors import InputError
 from guided_lgp.mlflow_model import log_model
 from guided_lgp.params import Params, load_params
-from guided_lgp.policy.paper.encoding import CHAINS, Encoding
+from guided_lgp.policy.paper.encoding import Encoding
 from guided_lgp.policy.paper.model import Model
 from guided_lgp.policy.relational import model as relational
 from guided_lgp.policy.relational.encoding import Range
@@ -216,9 +216,9 @@ def test_networks_can_be_loaded_from_mlflow(tmp_path: Path, experiment: str) -> 
     sub_policies = {
         name: ((rng.normal(size=(classes, inputs)).astype(np.float32), np.zeros(classes, "f4")),)
         for name, inputs, classes in zip(
-            CHAINS["grasp"],
+            Encoding().chains["grasp"],
             encoding.chain_inputs("grasp"),
-            map(encoding.classes, CHAINS["grasp"]),
+            map(encoding.classes, Encoding().chains["grasp"]),
             strict=True,
         )
     }

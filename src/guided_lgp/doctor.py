@@ -101,7 +101,7 @@ def _policy(name: str) -> Finding:
             title,
             False,
             str(error),
-            f"git checkout src, or: dvc repro {POLICIES[name]}; make ship",
+            f"git checkout src, or: dvc repro {POLICIES[name].stage}; make ship",
         )
     return Finding(title, True, f"trained, in {MODELS}")
 

@@ -32,7 +32,7 @@ from guided_lgp.experiments.enumerate_sequences import SHORTEST, VERDICTS
 from guided_lgp.experiments.files import read_table, write_table
 from guided_lgp.logic import two_goal_objectives
 from guided_lgp.policy.paper.dataset import Dataset, load_dataset
-from guided_lgp.policy.paper.encoding import CHAINS, Encoding
+from guided_lgp.policy.paper.encoding import Encoding
 from guided_lgp.policy.paper.inference import load_networks
 from guided_lgp.policy.paper.model import Model, load_model
 from guided_lgp.policy.paper.samples import build_dataset
@@ -300,7 +300,7 @@ def models(folder: Path) -> Path:
     rng = np.random.default_rng(2)
     encoding = Encoding()
     path = folder / "models"
-    for network, chain in CHAINS.items():
+    for network, chain in Encoding().chains.items():
         sub_policies = {}
         for name, inputs in zip(chain, encoding.chain_inputs(network), strict=True):
             widths = [inputs, 4, encoding.classes(name)]
@@ -319,7 +319,7 @@ def check_model(found: Model | None, network: str) -> None:
     """The layers of each sub-policy fit the encoding and each other."""
     if found is None:
         return
-    assert list(found.sub_policies) == list(CHAINS[network])
+    assert list(found.sub_policies) == list(Encoding().chains[network])
     for (name, layers), inputs in zip(
         found.sub_policies.items(), found.encoding.chain_inputs(network), strict=True
     ):
@@ -331,7 +331,7 @@ def check_model(found: Model | None, network: str) -> None:
 
 
 @examples(150)
-@given(network=st.sampled_from(sorted(CHAINS)), data=st.data())
+@given(network=st.sampled_from(sorted(Encoding().chains)), data=st.data())
 def test_garbled_weights(network: str, data: st.DataObject, models: Path, folder: Path) -> None:
     target = copy_files(models, folder / "models-2")
     file = target / f"{network}.safetensors"
@@ -340,7 +340,7 @@ def test_garbled_weights(network: str, data: st.DataObject, models: Path, folder
 
 
 @examples(60)
-@given(network=st.sampled_from(sorted(CHAINS)), data=st.data())
+@given(network=st.sampled_from(sorted(Encoding().chains)), data=st.data())
 def test_truncated_weights(network: str, data: st.DataObject, models: Path, folder: Path) -> None:
     target = copy_files(models, folder / "models-3")
     file = target / f"{network}.safetensors"
@@ -378,7 +378,7 @@ def test_weights_of_another_shape(
 @examples(100)
 @given(
     number=st.sampled_from((np.nan, np.inf, -np.inf)),
-    network=st.sampled_from(sorted(CHAINS)),
+    network=st.sampled_from(sorted(Encoding().chains)),
     data=st.data(),
 )
 def test_weights_that_are_no_numbers(
@@ -394,7 +394,7 @@ def test_weights_that_are_no_numbers(
 
 
 @examples(150)
-@given(network=st.sampled_from(sorted(CHAINS)), data=st.data())
+@given(network=st.sampled_from(sorted(Encoding().chains)), data=st.data())
 def test_spoilt_descriptions_of_models(
     network: str, data: st.DataObject, models: Path, folder: Path
 ) -> None:
@@ -417,7 +417,7 @@ def test_spoilt_descriptions_of_the_data_set(
 
 
 @examples(150)
-@given(network=st.sampled_from(sorted(CHAINS)), data=st.data())
+@given(network=st.sampled_from(sorted(Encoding().chains)), data=st.data())
 def test_garbled_descriptions_of_models(
     network: str, data: st.DataObject, models: Path, folder: Path
 ) -> None:
@@ -455,6 +455,6 @@ def test_the_undamaged_files_are_read(
     assert isinstance(found, GeneratedScenes)
     assert len(read_table(tables["verdicts"], STAGE, VERDICTS.names)) == 9
     assert len(load_dataset(dataset)) == 30
-    for network in CHAINS:
+    for network in Encoding().chains:
         check_model(load_model(models, network), network)
     assert load_networks(models, "train_policy").encoding == Encoding()

@@ -20,7 +20,7 @@ from guided_lgp.logic import (
     two_goal_objectives,
 )
 from guided_lgp.paths import EVALUATION, METRICS, SCENES, SEQUENCES, TRAINING
-from guided_lgp.policy.paper.encoding import CHAINS
+from guided_lgp.policy.paper.encoding import Encoding
 from guided_lgp.robots import load_robot
 from guided_lgp.scene import Scene, generate
 
@@ -62,7 +62,7 @@ def write_outputs(root: Path) -> None:
         write_table(root / SEQUENCES / f"{split}.parquet", pa.Table.from_pylist(rows))
     _write_generalization(root, scenes["test"], rng)
     _write_scalability(root, {setup: scenes[f"scalability_{setup}"] for setup in setups})
-    chains = {f"{network}.json": chain for network, chain in CHAINS.items()}
+    chains = {f"{network}.json": chain for network, chain in Encoding().chains.items()}
     chains |= {f"improved/{file}": chain for file, chain in chains.items()}
     for file, chain in (chains | {"relational.json": ("action",)}).items():
         sub_policies = {name: _training(CLASSES[name], rng) for name in chain}

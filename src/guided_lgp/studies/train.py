@@ -10,7 +10,7 @@ from guided_lgp.errors import InputError
 from guided_lgp.params import Params, TrainPolicy, TrainRelational
 from guided_lgp.paths import SCENES, SEQUENCES
 from guided_lgp.policy.paper.dataset import Dataset
-from guided_lgp.policy.paper.encoding import CHAINS
+from guided_lgp.policy.paper.encoding import Encoding
 from guided_lgp.policy.paper.samples import build_dataset
 from guided_lgp.policy.paper.train import train_model
 from guided_lgp.policy.relational.train import train_split
@@ -44,7 +44,7 @@ def train(root: Path, name: str) -> None:
         raise InputError(f"case {name!r}", "is unknown", ", ".join(study.cases))
     case = study.cases[name]
     settings = _settings(case, params)
-    networks = ["relational"] if isinstance(settings, TrainRelational) else list(CHAINS)
+    networks = ["relational"] if isinstance(settings, TrainRelational) else list(Encoding().chains)
     tasks = [
         _Training(
             case=case,
@@ -74,7 +74,7 @@ def _settings(case: Case, params: Params) -> TrainPolicy | TrainRelational:
     if case.dropout is not None:
         networks = {
             network: getattr(settings, network).model_copy(update={"dropout": case.dropout})
-            for network in CHAINS
+            for network in Encoding().chains
         }
         settings = settings.model_copy(update=networks)
     return settings

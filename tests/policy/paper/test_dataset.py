@@ -26,7 +26,7 @@ from guided_lgp.logic import (
 )
 from guided_lgp.params import SampleRecipe
 from guided_lgp.policy.paper.dataset import Dataset, load_dataset
-from guided_lgp.policy.paper.encoding import INSTRUCTIONS
+from guided_lgp.policy.paper.encoding import Encoding
 from guided_lgp.policy.paper.samples import build_dataset
 from guided_lgp.policy.split import training_objectives
 
@@ -53,7 +53,8 @@ def decode_goals(code: np.ndarray, symbols: Symbols) -> Objective:
 def decode_action(classes: np.ndarray, symbols: Symbols) -> Action:
     instruction, gripper, box, table = classes.tolist()
     on = (symbols.tables[table],) if table >= 0 else ()
-    return Action(INSTRUCTIONS[instruction], (symbols.grippers[gripper], symbols.boxes[box], *on))
+    name = Encoding().signature.instructions[instruction]
+    return Action(name, (symbols.grippers[gripper], symbols.boxes[box], *on))
 
 
 def expected_samples(
@@ -278,7 +279,7 @@ def test_configurations_that_are_not_given_are_not_used(
 def test_tensors_hold_the_true_previous_decisions(dataset: Dataset) -> None:
     samples = dataset.of_network("place")
     actions = dataset.actions[dataset.sample_state[samples]]
-    assert (actions[:, 0] == INSTRUCTIONS.index("place")).all()
+    assert (actions[:, 0] == Encoding().signature.instructions.index("place")).all()
     inputs, classes = dataset.tensors("place", "table", samples)
     assert inputs.shape == (len(samples), 41 + 2 + 3)
     assert classes.tolist() == actions[:, 3].tolist()
@@ -321,7 +322,7 @@ def test_missing_and_damaged_data_sets_name_the_stage(dataset: Dataset, tmp_path
     document = json.loads((tmp_path / "dataset.json").read_text())
     document["encoding"]["version"] = 99
     (tmp_path / "dataset.json").write_text(json.dumps(document))
-    with pytest.raises(InputError, match=r"encoding\.version: is 99.*build_dataset"):
+    with pytest.raises(InputError, match=r"encoding\.version: input should be 1.*build_dataset"):
         load_dataset(tmp_path)
 
 

@@ -4,9 +4,10 @@ import pytest
 from guided_lgp.domains import load_domain
 from guided_lgp.errors import InputError
 from guided_lgp.logic import Action, State, Symbols, parse_objective
-from guided_lgp.policy.paper.encoding import CHAINS, NOWHERE, Encoding
+from guided_lgp.policy.paper.encoding import NOWHERE, Encoding
 
 ENCODING = Encoding()
+FIVE_BOXES = Encoding(slots=(("gripper", 2), ("box", 5), ("table", 2)))
 ON_TABLES = State.of({"red": "tab1", "green": "tab1", "blue": "tab2"})
 MANY = load_domain().symbols(
     gripper=("pr2L", "pr2R"),
@@ -19,7 +20,13 @@ ON_TAB1 = State.of(dict.fromkeys(MANY.boxes, "tab1"))
 def test_sizes() -> None:
     assert (ENCODING.goal_size, ENCODING.state_size, ENCODING.input_size) == (10, 21, 41)
     assert len(ENCODING.input_names) == len(set(ENCODING.input_names)) == 41
-    assert [ENCODING.chain_inputs(network) for network in CHAINS] == [[41], [41, 43], [41, 43, 46]]
+    assert ENCODING.chains == {
+        "instruction": ("instruction",),
+        "grasp": ("gripper", "box"),
+        "place": ("gripper", "box", "table"),
+    }
+    sizes = [ENCODING.chain_inputs(network) for network in ENCODING.chains]
+    assert sizes == [[41], [41, 43], [41, 43, 46]]
 
 
 @pytest.mark.parametrize(
@@ -64,7 +71,7 @@ def test_state_is_the_position_of_every_symbol_in_order(symbols: Symbols) -> Non
 )
 def test_actions_by_hand(symbols: Symbols, action: str, classes: tuple[int, ...]) -> None:
     slots = ENCODING.fill((), ON_TABLES, symbols)
-    assert ENCODING.encode_action(slots, Action.parse(action)) == classes
+    assert ENCODING.encode_actions(slots, [Action.parse(action)]) == [classes]
 
 
 def test_what_fits_stays_as_it_is(symbols: Symbols) -> None:
@@ -81,7 +88,7 @@ def test_of_many_goals_two_unsatisfied_ones_supports_first() -> None:
     )
     slots = ENCODING.fill(objective, ON_TAB1, MANY)
     assert slots.goals == parse_objective(["(on blue tray)", "(on green blue)"])
-    assert slots.boxes == ("blue", "green", "red")
+    assert slots.of(["box"]) == ("blue", "green", "red")
 
     later = State.of({**dict(ON_TAB1.support), "blue": "tray", "green": "blue"})
     assert ENCODING.fill(objective, later, MANY).goals == parse_objective(["(on red green)"])
@@ -100,10 +107,10 @@ def test_boxes_of_the_goals_then_held_ones_then_others() -> None:
     )
     objective = parse_objective(["(on pink tray)"])
     slots = ENCODING.fill(objective, state, MANY)
-    assert slots.boxes == ("pink", "grey", "red")
-    assert ENCODING.encode_action(slots, Action("grasp", ("pr2R", "green"))) is None
-    assert ENCODING.encode_action(slots, Action("place", ("pr2L", "grey", "green"))) is None
-    assert ENCODING.encode_action(slots, Action("place", ("pr2L", "grey", "pink"))) == (1, 0, 1, 2)
+    assert slots.of(["box"]) == ("pink", "grey", "red")
+    actions = ["(grasp pr2R green)", "(place pr2L grey green)", "(place pr2L grey pink)"]
+    classes = ENCODING.encode_actions(slots, map(Action.parse, actions))
+    assert classes == [None, None, (1, 0, 1, 2)]
 
 
 @pytest.mark.parametrize(
@@ -116,7 +123,7 @@ def test_boxes_of_the_goals_then_held_ones_then_others() -> None:
     ],
 )
 def test_tables_of_the_goals_first(goals: list[str], surfaces: tuple[str, ...]) -> None:
-    assert ENCODING.fill(parse_objective(goals), ON_TAB1, MANY).surfaces == surfaces
+    assert ENCODING.fill(parse_objective(goals), ON_TAB1, MANY).of(["table"]) == surfaces
 
 
 def test_slots_without_a_symbol_are_empty_and_zero() -> None:
@@ -147,7 +154,7 @@ def test_without_chain_every_sub_policy_has_the_input_alone() -> None:
 
 def test_document_comes_back() -> None:
     normalised = Encoding(centre=(0.1,) * 21, scale=(0.7,) * 21)
-    for encoding in (ENCODING, Encoding(boxes=5), Encoding(chain=False), normalised):
+    for encoding in (ENCODING, FIVE_BOXES, Encoding(chain=False), normalised):
         assert Encoding.parse(encoding.document(), "x.json", "train_policy") == encoding
 
 
@@ -177,7 +184,7 @@ def test_named_boxes_fill_the_first_slots(symbols: Symbols) -> None:
     encoding = Encoding(named_first=True)
 
     def boxes(*goals: str, state: State = ON_TAB1) -> tuple[str | None, ...]:
-        return encoding.fill(parse_objective(goals), state, MANY).boxes
+        return encoding.fill(parse_objective(goals), state, MANY).of(["box"])
 
     assert boxes("(on blue grey)") == ("blue", "grey", "red")
     assert boxes("(held grey)", "(on green tray)") == ("grey", "green", "red")
@@ -187,7 +194,7 @@ def test_named_boxes_fill_the_first_slots(symbols: Symbols) -> None:
         gripper=symbols.grippers, box=("red", "green"), table=symbols.surfaces
     )
     slots = encoding.fill(parse_objective(["(held green)"]), ON_TABLES, fewer)
-    assert slots.boxes == ("green", "red", None)
+    assert slots.of(["box"]) == ("green", "red", None)
 
 
 def test_what_the_state_means_by_hand(symbols: Symbols) -> None:

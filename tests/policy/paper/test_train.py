@@ -8,7 +8,7 @@ from synthetic import Enumeration
 from guided_lgp.errors import InputError
 from guided_lgp.params import Network, Parallel, TrainPolicy
 from guided_lgp.policy.paper.dataset import Dataset
-from guided_lgp.policy.paper.encoding import CHAINS
+from guided_lgp.policy.paper.encoding import Encoding
 from guided_lgp.policy.paper.samples import build_dataset
 from guided_lgp.policy.paper.train import train_model, train_network
 from guided_lgp.policy.split import training_objectives
@@ -52,7 +52,7 @@ def test_the_report_holds_curves_confusion_and_both_splits(
     samples = len(dataset.of_network(network))
     assert document["network"] == network
     assert document["samples"] == samples
-    assert tuple(document["sub_policies"]) == CHAINS[network]
+    assert tuple(document["sub_policies"]) == Encoding().chains[network]
     for name, figures in document["sub_policies"].items():
         assert figures["classes"] == list(dataset.class_names(name))
         for split in (figures, figures["by_configuration"]):

@@ -1,4 +1,4 @@
-"""The training samples ((g, s_k), a_{k+1}) (paper, Sec. II and Appendix; DESIGN §5)."""
+"""The training samples ((g, s_k), a_{k+1}) (paper, Sec. II and Appendix)."""
 
 import zlib
 from dataclasses import dataclass
@@ -11,17 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guided_lgp.documents import read_json, write_json, written_whole
-from guided_lgp.domains import load_domain
 from guided_lgp.errors import InputError
 from guided_lgp.logic import Objective, Symbols, parse_objective
 from guided_lgp.policy.arrays import FloatArray, IntArray
-from guided_lgp.policy.paper.encoding import CHAINS, INSTRUCTIONS, VERSION, Encoding
+from guided_lgp.policy.paper.encoding import VERSION, Encoding, in_files
+from guided_lgp.policy.paper.signature import INSTRUCTION
 
 _SAMPLES = "samples.npz"
 _DOCUMENT = "dataset.json"
 _STAGE = "build_dataset"
-_COLUMNS = ("instruction", "gripper", "box", "table")
-
 _REMEDY = f"the output of the stage {_STAGE}"
 
 _ARRAYS = {
@@ -57,10 +55,11 @@ class Dataset:
     states: FloatArray
     """(M, state_size) the encoded states s_k of all sequences."""
     actions: NDArray[np.int8]
-    """(M, 4) classes of the action that follows: instruction, gripper, box, table (-1: none)."""
+    """(M, decisions) classes of the action that follows: instruction, gripper, box, table for
+    pick-and-place; -1 for what an instruction does not name."""
     supports: NDArray[np.int8]
-    """(M, boxes) what each box stands on before it, in the order of the slots: a class of table,
-    or -1 - g if gripper g holds the box."""
+    """(M, bodies) what each body stands on before it, in the order of the slots: a class of
+    support, or -1 - g if gripper g holds it."""
     configuration: NDArray[np.int32]
     """(M,) index of the configuration."""
     goals: FloatArray
@@ -75,18 +74,18 @@ class Dataset:
 
     def of_network(self, network: str) -> IntArray:
         """The samples that a network is trained on: all, or those of its instruction."""
-        if network not in INSTRUCTIONS:
+        if network == INSTRUCTION:
             return np.arange(len(self))
         instruction = self.actions[self.sample_state, 0]
-        return np.flatnonzero(instruction == INSTRUCTIONS.index(network))
+        return np.flatnonzero(instruction == self.encoding.signature.instructions.index(network))
 
     def tensors(
         self, network: str, sub_policy: str, samples: IntArray
     ) -> tuple[FloatArray, IntArray]:
-        """Inputs and classes of one sub-policy, with the true previous decisions (DESIGN §5).
+        """Inputs and classes of one sub-policy, with the true previous decisions.
 
         Args:
-            network: ``instruction``, ``grasp`` or ``place``.
+            network: one of the encoding's chains.
             sub_policy: a member of the network's chain.
             samples: indices of samples.
 
@@ -95,8 +94,9 @@ class Dataset:
         """
         state = self.sample_state[samples]
         blocks = [self.goals[self.sample_goals[samples]], self.states[state]]
-        for name in CHAINS[network]:
-            classes = self.actions[state, _COLUMNS.index(name)].astype(np.int64)
+        decisions = self.encoding.signature.decisions
+        for name in self.encoding.chains[network]:
+            classes = self.actions[state, decisions.index(name)].astype(np.int64)
             if name == sub_policy:
                 return np.concatenate(blocks, axis=1), classes
             if self.encoding.chain:
@@ -105,12 +105,10 @@ class Dataset:
 
     def class_names(self, sub_policy: str) -> tuple[str, ...]:
         """The names of a sub-policy's classes."""
-        return {
-            "instruction": INSTRUCTIONS,
-            "gripper": self.symbols.grippers,
-            "box": self.symbols.boxes,
-            "table": self.symbols.tables,
-        }[sub_policy]
+        signature = self.encoding.signature
+        if sub_policy == INSTRUCTION:
+            return signature.instructions
+        return self.symbols.of(signature.variables[sub_policy].type.name)
 
     def save(self, directory: Path) -> None:
         """Write ``samples.npz`` and ``dataset.json``; the same bytes for the same samples."""
@@ -119,9 +117,7 @@ class Dataset:
         document = {
             "version": VERSION,
             "samples": len(self),
-            "grippers": self.symbols.grippers,
-            "boxes": self.symbols.boxes,
-            "surfaces": self.symbols.surfaces,
+            **_names_of(self.symbols, self.encoding),
             "objectives": [[str(goal) for goal in objective] for objective in self.objectives],
             "configurations": self.configurations,
             "encoding": self.encoding.document(),
@@ -140,17 +136,14 @@ def load_dataset(directory: Path) -> Dataset:
     stored = document.get("encoding") if isinstance(document, dict) else None
     encoding = Encoding.parse(stored, str(path), _STAGE)
     try:
-        symbols = load_domain().symbols(
-            gripper=_names(document["grippers"]),
-            box=_names(document["boxes"]),
-            table=_names(document["surfaces"]),
+        symbols = encoding.signature.domain.symbols(
+            **{kind: _names(document[in_files(kind)]) for kind, _ in encoding.slots}
         )
         objectives = tuple(parse_objective(_names(goals)) for goals in document["objectives"])
         configurations = _names(document["configurations"])
     except (KeyError, TypeError, ValueError) as error:
         raise InputError(str(path), f"does not describe a data set: {error}", _REMEDY) from None
-    counts = (len(symbols.grippers), len(symbols.boxes), len(symbols.surfaces))
-    if counts != (encoding.grippers, encoding.boxes, encoding.surfaces):
+    if encoding.counts(symbols) != encoding.slots:
         raise InputError(str(path), "has other numbers of symbols than its encoding", _REMEDY)
     path = directory / _SAMPLES
     try:
@@ -163,6 +156,12 @@ def load_dataset(directory: Path) -> Dataset:
     if wrong is not None:
         raise InputError(str(path), wrong, _REMEDY)
     return Dataset(encoding, symbols, objectives, configurations, **samples)
+
+
+def _names_of(symbols: Symbols, encoding: Encoding) -> dict[str, tuple[str, ...]]:
+    """The own symbols of each logic type, by what files call them."""
+    signature = encoding.signature
+    return {in_files(kind): signature.own(kind, symbols) for kind in signature.kinds}
 
 
 def _names(values: object) -> tuple[str, ...]:
@@ -179,8 +178,8 @@ def _fault(samples: dict[str, Any], encoding: Encoding, configurations: int) -> 
     widths = {
         "states": (encoding.state_size,),
         "goals": (encoding.goals * encoding.goal_size,),
-        "actions": (len(_COLUMNS),),
-        "supports": (encoding.boxes,),
+        "actions": (len(encoding.signature.decisions),),
+        "supports": (encoding.bodies,),
     }
     for name, array in samples.items():
         rows = {"goals": goals, "sample_state": -1, "sample_goals": -1}.get(name, states)
@@ -189,10 +188,10 @@ def _fault(samples: dict[str, Any], encoding: Encoding, configurations: int) -> 
             return f"{name}: are {array.dtype} of shape {array.shape}"
         if not np.isfinite(array).all():
             return f"{name}: are not all finite"
-    tables = encoding.classes("table")
+    decisions = encoding.signature.decisions
     limits = {
-        "actions": ([0, 0, 0, -1], [2, encoding.grippers, encoding.boxes, tables]),
-        "supports": (-encoding.grippers, tables),
+        "actions": ([0, *[-1] * (len(decisions) - 1)], [encoding.classes(d) for d in decisions]),
+        "supports": (-encoding.holders, encoding.supports),
         "configuration": (0, configurations),
         "sample_state": (0, states),
         "sample_goals": (0, goals),
@@ -200,9 +199,10 @@ def _fault(samples: dict[str, Any], encoding: Encoding, configurations: int) -> 
     for name, (least, end) in limits.items():
         if ((samples[name] < least) | (samples[name] >= end)).any():
             return f"{name}: are out of range"
-    places = samples["actions"][:, 0] == INSTRUCTIONS.index("place")
-    if ((samples["actions"][:, 3] >= 0) != places).any():
-        return "actions: a table without a placement, or the other way round"
+    chains = [encoding.chains[name] for name in encoding.signature.instructions]
+    named = np.array([[d == INSTRUCTION or d in chain for d in decisions] for chain in chains])
+    if ((samples["actions"] >= 0) != named[samples["actions"][:, 0]]).any():
+        return "actions: name other symbols than their instructions do"
     if len(samples["sample_state"]) != len(samples["sample_goals"]):
         return "sample_goals: not as many as sample_state"
     return None

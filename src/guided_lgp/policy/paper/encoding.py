@@ -1,4 +1,4 @@
-"""Input and output encoding of the policy (paper, Sec. II-B; DESIGN §5 and §6).
+"""Input and output encoding of the paper's policy (paper, Sec. II-B).
 
 The networks have a fixed number of slots per logic type. A :class:`Slots` says which symbol of a
 problem fills which slot and which goals are encoded; an :class:`Encoding` turns goals, positions
@@ -7,34 +7,29 @@ and actions into numbers once the slots are filled.
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from math import isfinite
-from typing import Any
+from functools import cached_property
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from guided_lgp.domains import PAPER
 from guided_lgp.errors import InputError
-from guided_lgp.logic import Action, Goal, Objective, State, Symbols, satisfied, unsatisfied
+from guided_lgp.logic import Action, Objective, State, Symbols, satisfied, unsatisfied
 from guided_lgp.policy.arrays import FloatArray
+from guided_lgp.policy.paper.filling import Slots, fill, named, supports_first
+from guided_lgp.policy.paper.signature import INSTRUCTION, Signature
 
 VERSION = 1
 """Version of the encoding and of the files that hold it."""
 
-INSTRUCTIONS = ("grasp", "place")
-GOAL_KINDS = ("held", "on")
-
-CHAINS: Mapping[str, tuple[str, ...]] = {
-    "instruction": ("instruction",),
-    "grasp": ("gripper", "box"),
-    "place": ("gripper", "box", "table"),
-}
-"""The sub-policies of each network in the order of its classifier chain."""
-
 NOWHERE = 127
-"""The code of a box that is at no table or gripper of the slots."""
+"""The code of a body that is at no support or gripper of the slots."""
 
-_MOST_SLOTS = 100
-_SLOTS = ("grippers", "boxes", "surfaces", "goals")
+PAPER_SLOTS = (("gripper", 2), ("box", 3), ("table", 2))
+"""The slots of the paper's networks, by logic type."""
+
 _FLAGS = {
     "chain": "chain",
     "named_first": "named_first",
@@ -43,72 +38,116 @@ _FLAGS = {
 }
 """The fields that are true or false, and their keys in files."""
 
+_IN_FILES = {"gripper": "grippers", "box": "boxes", "table": "surfaces"}
+"""What files call the slots of a type, where it is not its name."""
 
-@dataclass(frozen=True)
-class Slots:
-    """The symbols and goals of a problem that the networks see; None is an empty slot."""
 
-    grippers: tuple[str | None, ...]
-    boxes: tuple[str | None, ...]
-    surfaces: tuple[str | None, ...]
-    goals: Objective
+class _Document(BaseModel):
+    """An encoding in a JSON file."""
 
-    @property
-    def tables(self) -> tuple[str | None, ...]:
-        """The slots of logic type table: surfaces, then boxes."""
-        return self.surfaces + self.boxes
+    model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 
-    @property
-    def symbols(self) -> tuple[str | None, ...]:
-        """All slots in the order of the state: grippers, boxes, surfaces."""
-        return self.grippers + self.boxes + self.surfaces
+    class Normalisation(BaseModel):
+        """Shift and scale of every coordinate."""
+
+        model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
+
+        centre: list[float]
+        scale: list[Annotated[float, Field(gt=0)]]
+
+    version: Literal[1]
+    domain: str = PAPER
+    slots: dict[str, Annotated[int, Field(ge=1, le=100)]]
+    chain: bool
+    named_first: bool
+    relative: bool
+    meaning: bool
+    normalisation: Normalisation
+    inputs: list[str]
 
 
 @dataclass(frozen=True)
 class Encoding:
     """The numbers of slots and the scaling of positions, and the encoding that follows from them.
 
-    The input (g, s_k) is: per goal the one-hots of its type, box and table (zeros where a goal has
-    no table), then the world x, y, z in m of every gripper, box and surface. With the default
-    numbers of slots these are 2 · (2 + 3 + 5) + 7 · 3 = 41 numbers. An empty slot is zero.
+    The input (g, s_k) is: per goal the one-hots of its type and of each of its symbols (zeros where
+    a goal type has no such parameter), then the world x, y, z in m of every symbol. With the
+    paper's domain and slots these are 2 · (2 + 3 + 5) + 7 · 3 = 41 numbers. An empty slot is zero.
 
     The paper takes positions as they are. What other recipes change is listed here; see
     :class:`guided_lgp.params.SampleRecipe`. One that normalises positions gives ``centre`` and
-    ``scale``, one number each per coordinate: (position - centre) / scale. One that adds what the
-    state means has one more number per goal, whether it holds, and, after the positions, for every
-    box the one-hot of the table or gripper that it is at.
+    ``scale``, one number each per coordinate: (position - centre) / scale. One that adds the
+    symbolic state has one more number per goal, whether it holds, and, after the positions, for
+    every body the one-hot of the support or gripper that it is at.
     """
 
-    grippers: int = 2
-    boxes: int = 3
-    surfaces: int = 2
+    domain: str = PAPER
+    """The name of the domain that declares instructions, goal types and logic types."""
+    slots: tuple[tuple[str, int], ...] = PAPER_SLOTS
+    """The number of slots for the own symbols of each logic type, in the order of the state."""
     goals: int = 2
     chain: bool = True
     """Whether sub-policies see the decisions before them in the chain."""
     named_first: bool = False
-    """Whether the boxes that goals name fill the first slots, in the order of the goals."""
+    """Whether the bodies that goals name fill the first slots, in the order of the goals."""
     relative: bool = False
-    """Whether positions are relative to the box in the first slot."""
+    """Whether positions are relative to the body in the first slot."""
     symbolic_state: bool = False
-    """Whether the input says what the state means."""
+    """Whether the input says what stands on what, what is held and which goals hold."""
     centre: tuple[float, ...] = ()
     scale: tuple[float, ...] = ()
+
+    @cached_property
+    def signature(self) -> Signature:
+        """What the domain says about networks, chains and goals."""
+        return Signature.of(self.domain)
+
+    @property
+    def chains(self) -> Mapping[str, tuple[str, ...]]:
+        """The sub-policies of each network in the order of its classifier chain."""
+        return self.signature.chains
+
+    def count(self, kinds: Iterable[str]) -> int:
+        """The number of slots for the own symbols of these types."""
+        slots = dict(self.slots)
+        return sum(slots.get(kind, 0) for kind in kinds)
+
+    def counts(self, symbols: Symbols) -> tuple[tuple[str, int], ...]:
+        """The number of own symbols of each logic type, to compare with the slots."""
+        return tuple((kind, len(self.signature.own(kind, symbols))) for kind, _ in self.slots)
+
+    @property
+    def bodies(self) -> int:
+        """The number of slots for what moves."""
+        return self.count(self.signature.movable)
+
+    @property
+    def supports(self) -> int:
+        """The number of slots for what bodies can stand on."""
+        return self.count(self.signature.supports)
+
+    @property
+    def holders(self) -> int:
+        """The number of slots for what can hold them."""
+        return self.count(self.signature.holders)
 
     @property
     def goal_size(self) -> int:
         """Length of one encoded goal."""
-        return len(GOAL_KINDS) + self.boxes + self.surfaces + self.boxes + self.symbolic_state
+        signature = self.signature
+        arguments = sum(self.count(signature.kinds_of[name]) for name in signature.goal_variables)
+        return len(signature.goal_kinds) + arguments + self.symbolic_state
 
     @property
     def position_size(self) -> int:
         """Number of coordinates in the encoded state."""
-        return 3 * (self.grippers + self.boxes + self.surfaces)
+        return 3 * sum(count for _, count in self.slots)
 
     @property
     def state_size(self) -> int:
         """Length of the encoded state."""
-        places = self.surfaces + self.boxes + self.grippers
-        return self.position_size + self.symbolic_state * self.boxes * places
+        places = self.supports + self.holders
+        return self.position_size + self.symbolic_state * self.bodies * places
 
     @property
     def input_size(self) -> int:
@@ -118,67 +157,78 @@ class Encoding:
     @property
     def input_names(self) -> tuple[str, ...]:
         """What every input stands for, in order."""
-        boxes = [f"box{index}" for index in range(1, self.boxes + 1)]
-        surfaces = [f"surface{index}" for index in range(1, self.surfaces + 1)]
-        grippers = [f"gripper{index}" for index in range(1, self.grippers + 1)]
+        labels = {kind: "surface" if kind == "table" else kind for kind, _ in self.slots}
+        slots = Slots(
+            tuple(
+                (kind, tuple(f"{labels[kind]}{index}" for index in range(1, count + 1)))
+                for kind, count in self.slots
+            ),
+            goals=(),
+        )
+        signature = self.signature
         goal = [
-            *GOAL_KINDS,
-            *(f"box={name}" for name in boxes),
-            *(f"table={name}" for name in surfaces + boxes),
+            *signature.goal_kinds,
+            *(
+                f"{variable}={name}"
+                for variable in signature.goal_variables
+                for name in slots.of(signature.kinds_of[variable])
+            ),
             *["holds"] * self.symbolic_state,
         ]
-        places = (surfaces + boxes + grippers) * self.symbolic_state
+        bodies = slots.of(signature.movable) * self.symbolic_state
+        places = slots.of((*signature.supports, *signature.holders))
         return (
             *(f"goal{index} {name}" for index in range(1, self.goals + 1) for name in goal),
-            *(f"{name} {axis}" for name in grippers + boxes + surfaces for axis in "xyz"),
-            *(f"{box} at {place}" for box in boxes for place in places),
+            *(f"{name} {axis}" for name in slots.symbols for axis in "xyz"),
+            *(f"{body} at {place}" for body in bodies for place in places),
         )
 
     def classes(self, sub_policy: str) -> int:
         """The number of classes of a sub-policy: its slots."""
-        return {
-            "instruction": len(INSTRUCTIONS),
-            "gripper": self.grippers,
-            "box": self.boxes,
-            "table": self.surfaces + self.boxes,
-        }[sub_policy]
+        if sub_policy == INSTRUCTION:
+            return len(self.signature.instructions)
+        return self.count(self.signature.kinds_of[sub_policy])
 
     def chain_inputs(self, network: str) -> list[int]:
         """The input length of each sub-policy: the input, then the previous one-hots."""
         sizes = [self.input_size]
-        for sub_policy in CHAINS[network][:-1]:
+        for sub_policy in self.chains[network][:-1]:
             sizes.append(sizes[-1] + (self.classes(sub_policy) if self.chain else 0))
         return sizes
 
     def fill(self, objective: Objective, state: State, symbols: Symbols) -> Slots:
-        """Choose the goals to encode and fill the slots (DESIGN §6, "More goals or boxes").
+        """Choose the goals to encode and fill the slots.
 
         As many goals as there are slots are encoded as they are. Of more goals, a subset of the
-        unsatisfied ones is, supports before what stands on them; if those goals name more boxes
+        unsatisfied ones is, supports before what stands on them; if those goals name more symbols
         than there are slots, only the first of them. The slots then take the symbols that these
-        goals name, the boxes that are held, and the others as declared, until they are full. A
+        goals name, the bodies that are held, and the others as declared, until they are full. A
         symbol whose place in the declaration is a slot keeps that slot, so that nothing moves
-        in a problem that fits; unless boxes that are named come first. Of more boxes than slots
+        in a problem that fits; unless bodies that are named come first. Of more bodies than slots
         they always do, lower ones first; the paper leaves the order open.
         """
+        declared = {kind: self.signature.own(kind, symbols) for kind, _ in self.slots}
         goals = objective
-        if len(goals) > self.goals or len(_boxes(goals, symbols)) > self.boxes:
+        if len(goals) > self.goals or not self._fits(goals, declared):
             remaining = objective if satisfied(state, objective) else unsatisfied(state, objective)
-            goals = _supports_first(remaining)[: self.goals]
-            if len(_boxes(goals, symbols)) > self.boxes:
+            goals = supports_first(remaining)[: self.goals]
+            if not self._fits(goals, declared):
                 goals = goals[:1]
-        in_order = self.named_first or len(symbols.boxes) > self.boxes
-        held = [box for box in symbols.boxes if state.holder(box) is not None]
-        named = [goal.table for goal in goals if goal.table in symbols.surfaces]
-        return Slots(
-            grippers=_fill(self.grippers, symbols.grippers, ()),
-            boxes=_fill(self.boxes, symbols.boxes, [*_boxes(goals, symbols), *held], in_order),
-            surfaces=_fill(self.surfaces, symbols.surfaces, [name for name in named if name]),
-            goals=goals,
-        )
+        filled = []
+        for kind, count in self.slots:
+            first, in_order = named(goals, declared[kind]), False
+            if kind in self.signature.movable:
+                first += [body for body in declared[kind] if state.holder(body) is not None]
+                in_order = self.named_first or len(declared[kind]) > count
+            filled.append((kind, fill(count, declared[kind], first, in_order)))
+        return Slots(tuple(filled), goals)
+
+    def _fits(self, goals: Objective, declared: Mapping[str, Sequence[str]]) -> bool:
+        """Whether there are slots for all that the goals name."""
+        return all(len(named(goals, declared[kind])) <= count for kind, count in self.slots)
 
     def encode_goals(self, slots: Slots, state: State) -> FloatArray:
-        """The encoded objective g; one goal is encoded as the same goal twice (DESIGN §5).
+        """The encoded objective g; one goal is encoded as the same goal twice.
 
         Args:
             slots: which symbol fills which slot, and the goals to encode.
@@ -190,10 +240,14 @@ class Encoding:
         code = np.zeros((self.goals, self.goal_size), dtype=np.float32)
         for row in range(self.goals):
             goal = slots.goals[min(row, len(slots.goals) - 1)]
-            code[row, GOAL_KINDS.index(goal.kind)] = 1
-            code[row, len(GOAL_KINDS) + slots.boxes.index(goal.box)] = 1
-            if goal.table is not None:
-                code[row, len(GOAL_KINDS) + self.boxes + slots.tables.index(goal.table)] = 1
+            code[row, self.signature.goal_kinds.index(goal.kind)] = 1
+            arguments = self.signature.arguments(goal)
+            column = len(self.signature.goal_kinds)
+            for variable in self.signature.goal_variables:
+                members = slots.of(self.signature.kinds_of[variable])
+                if variable in arguments:
+                    code[row, column + members.index(arguments[variable])] = 1
+                column += len(members)
             if self.symbolic_state:
                 code[row, -1] = satisfied(state, (goal,))
         return code.ravel()
@@ -205,7 +259,7 @@ class Encoding:
 
         Args:
             slots: which symbol fills which slot.
-            state: the symbolic state, for an encoding that says what the state means.
+            state: the symbolic state, for an encoding that has it.
             positions: world position (3,) in m of every symbol.
 
         Returns:
@@ -224,83 +278,80 @@ class Encoding:
         """World positions (..., position_size) in m as this encoding has them."""
         if self.relative:
             symbols = positions.reshape(*positions.shape[:-1], -1, 3)
-            first, surface = self.grippers, self.grippers + self.boxes
+            first = self._first(self.signature.movable[0])
+            support = self._first(self.signature.supports[0])
             moved = symbols - symbols[..., first : first + 1, :]
-            moved[..., first, :] = symbols[..., first, :] - symbols[..., surface, :]
+            moved[..., first, :] = symbols[..., first, :] - symbols[..., support, :]
             positions = moved.reshape(positions.shape)
         if not self.scale:
             return positions
         centre, scale = (np.array(part, dtype=np.float32) for part in (self.centre, self.scale))
         return (positions - centre) / scale
 
+    def _first(self, wanted: str) -> int:
+        """The number of the first slot of a type among all."""
+        return [kind for kind, count in self.slots for _ in range(count)].index(wanted)
+
     def encode_places(self, supports: NDArray[np.integer[Any]]) -> FloatArray:
-        """One-hots of what :meth:`encode_supports` returns: of tables, then of grippers.
+        """One-hots of what :meth:`encode_supports` returns: of supports, then of grippers.
 
         Args:
-            supports: (..., boxes).
+            supports: (..., bodies).
 
         Returns:
-            (..., boxes · (tables + grippers)); zeros for a box at none of them.
+            (..., bodies · (supports + grippers)); zeros for a body at none of them.
         """
-        tables = self.surfaces + self.boxes
-        codes = np.array([*range(tables), *(-1 - gripper for gripper in range(self.grippers))])
+        codes = np.array([*range(self.supports), *(-1 - holder for holder in range(self.holders))])
         one_hot: FloatArray = np.equal(supports[..., None], codes).astype(np.float32)
         return one_hot.reshape(*supports.shape[:-1], -1)
 
-    def encode_action(self, slots: Slots, action: Action) -> tuple[int, int, int, int] | None:
-        """The classes of an action: instruction, gripper, box, table (-1 for a grasp).
+    def encode_actions(
+        self, slots: Slots, actions: Iterable[Action]
+    ) -> list[tuple[int, ...] | None]:
+        """The classes of actions: the instruction, then one per parameter of any instruction.
 
         Returns:
-            None if one of its symbols fills no slot.
+            For each action, in the order of the signature's decisions; -1 where the instruction has
+            no such parameter. None for an action on a symbol that fills no slot.
         """
-        if action.gripper not in slots.grippers or action.box not in slots.boxes:
-            return None
-        if action.table is not None and action.table not in slots.tables:
-            return None
-        return (
-            INSTRUCTIONS.index(action.instruction),
-            slots.grippers.index(action.gripper),
-            slots.boxes.index(action.box),
-            -1 if action.table is None else slots.tables.index(action.table),
-        )
+        signature = self.signature
+        rows = {name: _rows(slots.of(signature.kinds_of[name])) for name in signature.decisions[1:]}
+
+        def encode(action: Action) -> tuple[int, ...] | None:
+            arguments = signature.arguments(action)
+            if any(symbol not in rows[name] for name, symbol in arguments.items()):
+                return None
+            symbols = (
+                row[arguments[name]] if name in arguments else -1 for name, row in rows.items()
+            )
+            return signature.instructions.index(action.instruction), *symbols
+
+        return [encode(action) for action in actions]
 
     def encode_supports(self, slots: Slots, state: State) -> tuple[int, ...]:
-        """What each box stands on or is held by.
+        """What each body stands on or is held by.
 
         Returns:
-            (boxes,) the class of the table that a box stands on, or -1 - g if gripper g holds it;
-            :data:`NOWHERE` for an empty slot or a support that fills none.
+            (bodies,) the class of the support that a body stands on, or -1 - g if gripper g holds
+            it; :data:`NOWHERE` for an empty slot or a support that fills none.
         """
-        codes = {name: row for row, name in enumerate(slots.tables) if name is not None}
-        codes |= {name: -1 - row for row, name in enumerate(slots.grippers) if name is not None}
+        supports = slots.of(self.signature.supports)
+        holders = slots.of(self.signature.holders)
+        codes = _rows(supports) | {name: -1 - row for name, row in _rows(holders).items()}
         at = dict(state.support + state.held)
-        return tuple(
-            NOWHERE if name is None else codes.get(at[name], NOWHERE) for name in slots.boxes
-        )
+        bodies = slots.of(self.signature.movable)
+        return tuple(NOWHERE if name is None else codes.get(at[name], NOWHERE) for name in bodies)
 
     def document(self) -> dict[str, Any]:
         """What is saved as JSON with the data set and the weights."""
         return {
             "version": VERSION,
-            "slots": {name: getattr(self, name) for name in _SLOTS},
+            **({} if self.domain == PAPER else {"domain": self.domain}),
+            "slots": {in_files(kind): count for kind, count in self.slots} | {"goals": self.goals},
             **{key: getattr(self, name) for name, key in _FLAGS.items()},
             "normalisation": {"centre": list(self.centre), "scale": list(self.scale)},
             "inputs": list(self.input_names),
         }
-
-    def _possible(self) -> bool:
-        """Whether the values, which a file may have made up, are of the right types and sizes."""
-        slots = [getattr(self, name) for name in _SLOTS]
-        flags = [getattr(self, name) for name in _FLAGS]
-        numbers = self.centre + self.scale
-        return (
-            all(type(count) is int and 1 <= count <= _MOST_SLOTS for count in slots)
-            and all(type(flag) is bool for flag in flags)
-            and all(type(number) is float and isfinite(number) for number in numbers)
-            and all(scale > 0 for scale in self.scale)
-            and len(self.scale) == len(self.centre)
-            and len(self.scale) in (0, self.position_size)
-        )
 
     @classmethod
     def parse(cls, document: object, where: str, stage: str) -> "Encoding":
@@ -315,60 +366,43 @@ class Encoding:
             InputError: another version, or a document that does not describe this encoding.
         """
         remedy = f"the encoding of version {VERSION}; run the stage {stage} again"
-        if not isinstance(document, dict) or document.get("version") != VERSION:
-            version = document.get("version") if isinstance(document, dict) else None
-            raise InputError(f"{where}: encoding.version", f"is {version!r}", remedy)
         try:
+            read = _Document.model_validate(document)
             encoding = cls(
-                **document["slots"],
-                **{name: document[key] for name, key in _FLAGS.items()},
-                centre=tuple(document["normalisation"]["centre"]),
-                scale=tuple(document["normalisation"]["scale"]),
+                domain=read.domain,
+                slots=_known_slots(read),
+                goals=read.slots["goals"],
+                **{name: getattr(read, key) for name, key in _FLAGS.items()},
+                centre=tuple(read.normalisation.centre),
+                scale=tuple(read.normalisation.scale),
             )
-            faithful = encoding._possible() and document == encoding.document()
-        except (KeyError, TypeError, ValueError):
+            faithful = encoding._scaled_whole() and document == encoding.document()
+        except ValidationError as error:
+            first = error.errors()[0]
+            key = ".".join(map(str, ("encoding", *first["loc"])))
+            raise InputError(f"{where}: {key}", first["msg"].lower(), remedy) from None
+        except (KeyError, InputError):
             faithful = False
         if not faithful:
             raise InputError(f"{where}: encoding", "is not what this program encodes", remedy)
         return encoding
 
-
-def _boxes(goals: Iterable[Goal], symbols: Symbols) -> list[str]:
-    """The boxes that goals name, as what moves or as what it shall stand on."""
-    names = [name for goal in goals for name in (goal.box, goal.table)]
-    return list(dict.fromkeys(name for name in names if name in symbols.boxes))
+    def _scaled_whole(self) -> bool:
+        """Whether all coordinates are shifted and scaled, or none."""
+        return len(self.centre) == len(self.scale) and len(self.scale) in (0, self.position_size)
 
 
-def _supports_first(goals: Objective) -> Objective:
-    """The goals in their order, except that the goal of a support precedes what stands on it."""
-    by_box = {goal.box: goal for goal in goals}
-    ordered: dict[Goal, None] = {}
-
-    def add(goal: Goal) -> None:
-        if goal not in ordered:
-            support = by_box.get(goal.table) if goal.table is not None else None
-            if support is not None:
-                add(support)
-            ordered[goal] = None
-
-    for goal in goals:
-        add(goal)
-    return tuple(ordered)
+def _rows(members: Sequence[str | None]) -> dict[str, int]:
+    """The number of each symbol among the slots."""
+    return {name: row for row, name in enumerate(members) if name is not None}
 
 
-def _fill(
-    count: int, declared: Sequence[str], first: Iterable[str], in_order: bool = False
-) -> tuple[str | None, ...]:
-    """Fill slots with ``first``, then with the others; whoever has a slot of its own keeps it.
+def in_files(kind: str) -> str:
+    """What files call the own symbols of a logic type."""
+    return _IN_FILES.get(kind, kind)
 
-    Args:
-        count: the number of slots.
-        declared: all symbols.
-        first: those that are to have a slot in any case.
-        in_order: leave nobody where it is; the slots are taken in order.
-    """
-    chosen = list(dict.fromkeys((*first, *declared)))[:count]
-    slots = [None if in_order or name not in chosen else name for name in declared[:count]]
-    slots += [None] * (count - len(slots))
-    moved = iter([name for name in chosen if name not in slots])
-    return tuple(name if name is not None else next(moved, None) for name in slots)
+
+def _known_slots(read: _Document) -> tuple[tuple[str, int], ...]:
+    """The slots that a file names, in the order of the domain's types."""
+    kinds = Signature.of(read.domain).kinds
+    return tuple((kind, read.slots[in_files(kind)]) for kind in kinds)

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from guided_lgp.errors import InputError
 from guided_lgp.logic import Action, Objective, State
 from guided_lgp.policy.arrays import FloatArray
-from guided_lgp.policy.paper.encoding import CHAINS, INSTRUCTIONS, Encoding
+from guided_lgp.policy.paper.encoding import Encoding
 from guided_lgp.policy.paper.model import Layers, Model, load_model
+from guided_lgp.policy.paper.signature import INSTRUCTION
 from guided_lgp.policy.symbols import declared_symbols
 
 FLOOR = np.log(1e-6)
@@ -27,7 +28,7 @@ class HierarchicalPolicy:
 
     def __init__(self, models: Mapping[str, Model]) -> None:
         self._chains = {network: tuple(m.sub_policies.values()) for network, m in models.items()}
-        self.encoding: Encoding = models["instruction"].encoding
+        self.encoding: Encoding = models[INSTRUCTION].encoding
 
     def log_probabilities(
         self,
@@ -49,16 +50,17 @@ class HierarchicalPolicy:
                 self.encoding.encode_state(slots, state, positions),
             ]
         )
-        instruction = _log_softmax(_forward(self._chains["instruction"][0], code[None]))[0]
+        instruction = _log_softmax(_forward(self._chains[INSTRUCTION][0], code[None]))[0]
         joint = {
             name: chain_log_probabilities(self._chains[name], code[None])[0]
-            for name in INSTRUCTIONS
+            for name in self.encoding.signature.instructions
         }
         scores = np.full(len(actions), FLOOR)
-        for row, action in enumerate(actions):
-            classes = self.encoding.encode_action(slots, action)
+        encoded = self.encoding.encode_actions(slots, actions)
+        for row, (action, classes) in enumerate(zip(actions, encoded, strict=True)):
             if classes is not None:
-                chosen = tuple(index for index in classes[1:] if index >= 0)
+                decided = dict(zip(self.encoding.signature.decisions, classes, strict=True))
+                chosen = tuple(decided[name] for name in self.encoding.chains[action.instruction])
                 scores[row] = instruction[classes[0]] + joint[action.instruction][chosen]
         return scores
 
@@ -74,7 +76,9 @@ def load_networks(directory: Path, stage: str) -> HierarchicalPolicy:
         InputError: a file is missing, damaged, of another version, or the networks were trained
             with different encodings.
     """
-    models = {network: load_model(directory, network, stage) for network in CHAINS}
+    first = load_model(directory, INSTRUCTION, stage)
+    others = [name for name in first.encoding.chains if name != INSTRUCTION]
+    models = {INSTRUCTION: first} | {n: load_model(directory, n, stage) for n in others}
     if len({model.encoding for model in models.values()}) > 1:
         raise InputError(
             str(directory),

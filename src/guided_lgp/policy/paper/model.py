@@ -12,7 +12,7 @@ from safetensors.numpy import load_file, save
 from guided_lgp.documents import read_json, write_json, written_whole
 from guided_lgp.errors import InputError
 from guided_lgp.policy.arrays import FloatArray
-from guided_lgp.policy.paper.encoding import CHAINS, VERSION, Encoding
+from guided_lgp.policy.paper.encoding import VERSION, Encoding
 
 Layers = tuple[tuple[FloatArray, FloatArray], ...]
 """Weight (outputs, inputs) and bias (outputs,) of every layer of a sub-policy."""
@@ -56,7 +56,7 @@ def load_model(directory: Path, network: str, stage: str = "train_policy") -> Mo
 
     Args:
         directory: the folder of the files.
-        network: ``instruction``, ``grasp`` or ``place``.
+        network: ``instruction``, or the name of one.
         stage: the stage that makes them, for the message.
 
     Raises:
@@ -103,8 +103,10 @@ def _sizes(document: Any, network: str, encoding: Encoding) -> dict[str, list[in
     described = document.get("sub_policies")
     if not isinstance(described, dict) or not isinstance(document.get("training"), dict):
         return None
+    if network not in encoding.chains:
+        return None
     sizes = {}
-    for name in CHAINS[network]:
+    for name in encoding.chains[network]:
         widths = described.get(name)
         if not isinstance(widths, list) or len(widths) < 2:
             return None
@@ -112,6 +114,6 @@ def _sizes(document: Any, network: str, encoding: Encoding) -> dict[str, list[in
             return None
         sizes[name] = widths
     ends = [(widths[0], widths[-1]) for widths in sizes.values()]
-    classes = [encoding.classes(name) for name in CHAINS[network]]
+    classes = [encoding.classes(name) for name in encoding.chains[network]]
     expected = list(zip(encoding.chain_inputs(network), classes, strict=True))
     return sizes if ends == expected and document.get("network") == network else None

@@ -1,8 +1,8 @@
-"""Collects the training samples from the enumerated sequences (paper, Appendix; DESIGN §5)."""
+"""Collects the training samples from the enumerated sequences (paper, Appendix)."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from itertools import permutations
+from itertools import permutations, product
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +28,8 @@ from guided_lgp.logic import (
 from guided_lgp.params import SampleRecipe
 from guided_lgp.policy.arrays import BoolArray, FloatArray, IntArray
 from guided_lgp.policy.paper.dataset import Dataset
-from guided_lgp.policy.paper.encoding import Encoding, Slots
+from guided_lgp.policy.paper.encoding import Encoding, in_files
+from guided_lgp.policy.paper.filling import Slots
 from guided_lgp.scene import Scene
 
 _LEAST_DEVIATION = 1e-3  # m; less is no information, and scaling it up would be noise
@@ -91,8 +92,7 @@ def build_dataset(
     feasible = verdicts[verdicts["feasible"]]
     rows_of = {str(name): rows for name, rows in feasible.groupby("configuration")}
     goals = _GoalCodes(objectives, symbols, encoding, recipe)
-    declared = Slots(symbols.grippers, symbols.boxes, symbols.surfaces, goals=())
-    orders = [replace(declared, boxes=boxes) for boxes in permutations(symbols.boxes)]
+    declared, *_ = orders = _orders(encoding, symbols)
 
     states, actions, supports, configuration = [], [], [], []
     sample_state, sample_goals = [], []
@@ -144,6 +144,16 @@ def build_dataset(
     )
 
 
+def _orders(encoding: Encoding, symbols: Symbols) -> list[Slots]:
+    """The slots as declared, then with the bodies of each type in all other orders."""
+    orders = []
+    for kind in encoding.signature.kinds:
+        own = encoding.signature.own(kind, symbols)
+        movable = kind in encoding.signature.movable
+        orders.append([(kind, order) for order in (permutations(own) if movable else [own])])
+    return [Slots(own, goals=()) for own in product(*orders)]
+
+
 @dataclass(frozen=True)
 class _Sequences:
     """The feasible sequences of one configuration; the steps of all, one after another."""
@@ -157,9 +167,9 @@ class _Sequences:
     states: FloatArray
     """(M, position_size) world positions (m) of the slots before each step."""
     actions: NDArray[np.int8]
-    """(M, 4) classes of each step's action."""
+    """(M, decisions) classes of each step's action."""
     supports: NDArray[np.int8]
-    """(M, boxes) what each box stands on before each step; see :class:`Dataset`."""
+    """(M, bodies) what each body stands on before each step; see :class:`Dataset`."""
 
 
 def _feasible_sequences(
@@ -190,12 +200,12 @@ def _feasible_sequences(
         positions = np.asarray(flat, np.float32).reshape(-1, len(stored), 3)[:-1]
         order = [stored.index(name) for name in own.symbols if name is not None]
         states.append(positions[:, order].reshape(-1, encoding.position_size))
-    classes = [
-        encoding.encode_action(own, action)
-        for path, own in zip(skeletons, slots, strict=True)
-        for action in path
-    ]
     along = [progress(skeleton) for skeleton in skeletons]
+    classes = [
+        row
+        for path, own in zip(skeletons, slots, strict=True)
+        for row in encoding.encode_actions(own, path)
+    ]
     supports = [
         encoding.encode_supports(own, state)
         for path, own in zip(along, slots, strict=True)
@@ -206,8 +216,8 @@ def _feasible_sequences(
         slots=slots,
         sequence=np.repeat(np.arange(len(skeletons)), [len(path) for path in skeletons]),
         states=np.concatenate(states),
-        actions=np.array(classes, dtype=np.int8).reshape(-1, 4),
-        supports=np.array(supports, dtype=np.int8).reshape(-1, encoding.boxes),
+        actions=np.array(classes, dtype=np.int8).reshape(-1, len(encoding.signature.decisions)),
+        supports=np.array(supports, dtype=np.int8).reshape(-1, encoding.bodies),
     )
 
 
@@ -277,8 +287,9 @@ class _GoalCodes:
 
     def _code(self, goals: Objective, slots: Slots, state: State) -> int:
         if self._encoding.named_first:
+            movable = self._encoding.signature.movable
             chosen = self._encoding.fill(goals, state, self._symbols)
-            if chosen.boxes != slots.boxes:
+            if chosen.of(movable) != slots.of(movable):
                 return _NONE
         code = self._encoding.encode_goals(replace(slots, goals=goals), state)
         if code.tobytes() not in self._row:
@@ -304,14 +315,14 @@ def _common_symbols(scenes: Sequence[Scene], encoding: Encoding) -> Symbols:
                 "has other symbols than the first training configuration",
                 "training configurations with the same symbols",
             )
-    counts = (len(symbols.grippers), len(symbols.boxes), len(symbols.surfaces))
-    if counts != (encoding.grippers, encoding.boxes, encoding.surfaces):
-        raise InputError(
-            f"scene {scenes[0].name}",
-            "{} grippers, {} boxes, {} tables".format(*counts),
-            f"{encoding.grippers}, {encoding.boxes} and {encoding.surfaces} for training",
-        )
+    counts = encoding.counts(symbols)
+    if counts != encoding.slots:
+        raise InputError(f"scene {scenes[0].name}", _text(counts), f"{_text(encoding.slots)} slots")
     return symbols
+
+
+def _text(counts: Iterable[tuple[str, int]]) -> str:
+    return ", ".join(f"{count} {in_files(kind)}" for kind, count in counts)
 
 
 def _shortest_lengths(

@@ -10,7 +10,6 @@ from guided_lgp.params import Network, Parallel, TrainPolicy
 from guided_lgp.policy import splits
 from guided_lgp.policy.arrays import BoolArray
 from guided_lgp.policy.paper.dataset import Dataset
-from guided_lgp.policy.paper.encoding import CHAINS
 from guided_lgp.policy.paper.model import Model
 from guided_lgp.policy.paper.training import Fit, fit
 from guided_lgp.policy.splits import SPLITS, TrainingReport
@@ -53,7 +52,7 @@ def train_network(
     """Train the sub-policies of a network and save it.
 
     Args:
-        network: ``instruction``, ``grasp`` or ``place``.
+        network: ``instruction``, or the name of one.
         dataset: the training samples.
         settings: of training (paper, Table IV).
         parallel: back end and workers; the result does not depend on them.
@@ -65,7 +64,7 @@ def train_network(
     trainings = [t for split in SPLITS for t in _trainings(network, dataset, settings, split)]
     fits = splits.fit_all(trainings, parallel, network)
     _model(network, dataset, settings, fits["random"]).save(directory)
-    classes = {name: dataset.class_names(name) for name in CHAINS[network]}
+    classes = {name: dataset.class_names(name) for name in dataset.encoding.chains[network]}
     samples = len(dataset.of_network(network))
     return TrainingReport.of(network, settings.seed, samples, classes, fits)
 
@@ -74,7 +73,7 @@ def train_model(network: str, dataset: Dataset, settings: TrainPolicy, split: st
     """One network in this process; for studies, which train many side by side.
 
     Args:
-        network: ``instruction``, ``grasp`` or ``place``.
+        network: ``instruction``, or the name of one.
         dataset: the training samples.
         settings: of training.
         split: the one of :data:`SPLITS` that decides about the weights.
@@ -95,6 +94,7 @@ def _trainings(
     samples = f"samples of the network {network}"
     held_out = validation[dataset.of_network(network)]
     splits.require_both_sides(held_out, "train_policy", samples, split)
+    number = list(dataset.encoding.chains).index(network)
     return [
         _Training(
             network=network,
@@ -104,9 +104,9 @@ def _trainings(
             validation=validation,
             settings=getattr(settings, network),
             patience=settings.patience,
-            seed=np.random.SeedSequence([settings.seed, list(CHAINS).index(network), index]),
+            seed=np.random.SeedSequence([settings.seed, number, index]),
         )
-        for index, sub_policy in enumerate(CHAINS[network])
+        for index, sub_policy in enumerate(dataset.encoding.chains[network])
     ]
 
 
@@ -116,6 +116,6 @@ def _model(network: str, dataset: Dataset, settings: TrainPolicy, fits: Mapping[
     return Model(
         network=network,
         encoding=dataset.encoding,
-        sub_policies={name: fits[name].layers for name in CHAINS[network]},
+        sub_policies={name: fits[name].layers for name in dataset.encoding.chains[network]},
         training={"seed": settings.seed, "samples": samples, **own.model_dump()},
     )

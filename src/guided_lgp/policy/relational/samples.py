@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from guided_lgp.errors import InputError
 from guided_lgp.policy.arrays import BoolArray, IntArray
 from guided_lgp.policy.paper.dataset import Dataset
-from guided_lgp.policy.paper.encoding import GOAL_KINDS, Encoding
+from guided_lgp.policy.paper.encoding import Encoding
 from guided_lgp.policy.relational.encoding import (
     CARRIES,
     ELSEWHERE,
@@ -68,14 +68,15 @@ def examples(dataset: Dataset) -> Examples:
     _, first, group = np.unique(keys, axis=0, return_index=True, return_inverse=True)
 
     instruction, gripper, box, table = dataset.actions[state].T.astype(np.int64)
-    tables = encoding.surfaces + encoding.boxes
-    target = np.where(instruction == 0, encoding.surfaces + box, table)
+    tables = encoding.supports
+    surfaces = tables - encoding.bodies
+    target = np.where(instruction == 0, surfaces + box, table)
     right = np.zeros((len(first), len(SIDES), tables), dtype=bool)
     right[group, gripper, target] = True
-    positions = dataset.states[state[first]].reshape(len(first), -1, 3)[:, encoding.grippers :]
-    boxes, surfaces = np.split(positions, [encoding.boxes], axis=1)
+    positions = dataset.states[state[first]].reshape(len(first), -1, 3)[:, encoding.holders :]
+    boxes, fixed = np.split(positions, [encoding.bodies], axis=1)
     situations = Situations(
-        np.concatenate([surfaces, boxes], axis=1),
+        np.concatenate([fixed, boxes], axis=1),
         dataset.supports[state[first]].astype(np.int64),
         goals[first],
     )
@@ -103,11 +104,10 @@ def _goals(dataset: Dataset) -> IntArray:
     """(objectives, boxes) the encoded objectives as what each box shall stand on."""
     encoding = dataset.encoding
     codes = dataset.goals.reshape(len(dataset.goals), encoding.goals, encoding.goal_size)
-    kind, box, table = np.split(codes, [2, 2 + encoding.boxes], axis=2)
-    places = np.where(
-        kind.argmax(axis=2) == GOAL_KINDS.index("held"), GOAL_HELD, table.argmax(axis=2)
-    )
-    goals = np.full((len(codes), encoding.boxes), NO_GOAL)
+    kind, box, table = np.split(codes, [2, 2 + encoding.bodies], axis=2)
+    held = kind.argmax(axis=2) == encoding.signature.goal_kinds.index("held")
+    places = np.where(held, GOAL_HELD, table.argmax(axis=2))
+    goals = np.full((len(codes), encoding.bodies), NO_GOAL)
     np.put_along_axis(goals, box.argmax(axis=2), places, axis=1)
     return goals
 

@@ -9,7 +9,6 @@ from guided_lgp.params import Parallel, TrainRelational
 from guided_lgp.policy import splits
 from guided_lgp.policy.arrays import BoolArray
 from guided_lgp.policy.paper.dataset import Dataset
-from guided_lgp.policy.paper.encoding import INSTRUCTIONS
 from guided_lgp.policy.relational.model import NAME, Model
 from guided_lgp.policy.relational.samples import Examples, examples
 from guided_lgp.policy.relational.training import Fit, fit
@@ -62,7 +61,7 @@ def train_relational(
     trainings = [_training(problems, split, settings) for split in SPLITS]
     fits = splits.fit_all(trainings, parallel, NAME)
     _model(trainings[0], fits["random"][ACTION]).save(directory)
-    classes = {ACTION: INSTRUCTIONS}
+    classes = {ACTION: dataset.encoding.signature.instructions}
     return TrainingReport.of(NAME, settings.seed, len(problems), classes, fits)
 
 

@@ -12,7 +12,6 @@ from torch.optim.lr_scheduler import CosineAnnealingLR
 
 from guided_lgp.params import TrainRelational
 from guided_lgp.policy.arrays import IntArray
-from guided_lgp.policy.paper.encoding import INSTRUCTIONS
 from guided_lgp.policy.relational.encoding import Range, applicable, graphs
 from guided_lgp.policy.relational.model import Weights
 from guided_lgp.policy.relational.network import RelationalNetwork
@@ -143,7 +142,7 @@ def fit(
 
 @torch.no_grad()
 def _confusion(network: RelationalNetwork, batches: Batches) -> IntArray:
-    count = len(INSTRUCTIONS)
+    count = 2
     confusion = np.zeros((count, count), dtype=np.int64)
     for batch in batches:
         log_p, held, right = log_probabilities(network, batch), batch[2], batch[-1]
