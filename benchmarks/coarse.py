@@ -18,14 +18,17 @@ import numpy as np
 
 from guided_lgp import parallel
 from guided_lgp.bounds.coarse import CoarseBound
-from guided_lgp.bounds.coarse.formulation import Formulator, Margins, SceneGeometry
+from guided_lgp.bounds.coarse.formulation import Formulator
 from guided_lgp.bounds.coarse.ipopt import Ipopt
-from guided_lgp.bounds.coarse.solver import Program, Settings, Solution, default_solver
+from guided_lgp.bounds.coarse.solver import Settings, Solution, default_solver
 from guided_lgp.bounds.coarse.starts import Starts
+from guided_lgp.bounds.program.arrays import Program
+from guided_lgp.bounds.program.geometry import Margins, SceneGeometry
 from guided_lgp.bounds.results import Array, CoarseResult
 from guided_lgp.logic import Skeleton, applicable_actions, successor
 from guided_lgp.params import load_params
 from guided_lgp.paths import PARAMS
+from guided_lgp.robots import load_robot
 from guided_lgp.scene import Scene
 from guided_lgp.scene.generate import generate
 
@@ -117,12 +120,12 @@ def _judge(skeleton: Skeleton, scene: Scene, usual: CoarseBound, patient: Coarse
 def _one_start(sequence: Sequence) -> float:
     """Seconds from skeleton and prefix to the end of the first start, without verification."""
     geometry = SceneGeometry(sequence.scene)
-    starts = Starts(geometry, default_solver())
+    starts = Starts(geometry, default_solver(load_robot("pr2")))
     began = time.process_time()
     formulation = Formulator(geometry, Margins()).build(sequence.result.skeleton)
-    known = getattr(sequence.prefix, "values", None)
-    start = starts.draw(formulation, np.random.default_rng(0), 0.0, known)
-    default_solver().solve(formulation.program, start, Settings())
+    warm_start = getattr(sequence.prefix, "values", None)
+    start = starts.draw(formulation, np.random.default_rng(0), 0.0, warm_start)
+    default_solver(load_robot("pr2")).solve(formulation.program, start, Settings())
     return time.process_time() - began
 
 
@@ -137,18 +140,18 @@ def _against_ipopt(sequences: list[Sequence]) -> dict[str, Any]:
     for sequence in sequences:
         geometry = SceneGeometry(sequence.scene)
         formulation = Formulator(geometry, Margins()).build(sequence.result.skeleton)
-        start = Starts(geometry, default_solver()).draw(
+        start = Starts(geometry, default_solver(load_robot("pr2"))).draw(
             formulation, np.random.default_rng(0), noise=0.0
         )
         programs.append((formulation.program, start))
     # before IPOPT, whose building leaves a memory in which the first solve is slow
     ours = [
-        _timed(partial(default_solver().solve, program, start, Settings()))
+        _timed(partial(default_solver(load_robot("pr2")).solve, program, start, Settings()))
         for program, start in programs
     ]
     feasible, optimal = [], []
     for program, start in programs:
-        oracle = Ipopt(program, start, Settings())
+        oracle = Ipopt(load_robot("pr2"), program, start, Settings())
         feasible.append(_timed(partial(oracle.solve, start, optimal=False)))
         optimal.append(_timed(partial(oracle.solve, start)))
     figures: dict[str, Any] = {

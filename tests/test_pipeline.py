@@ -24,8 +24,17 @@ INFRASTRUCTURE = {"guided_lgp"} | {
     f"guided_lgp.{name}" for name in ("documents", "errors", "parallel", "params", "paths")
 }
 """Modules that do not determine a stage's results: fan-out, messages, places."""
-UNUSED = {"enumerate_sequences": {"guided_lgp.bounds.path"}}
-"""What a stage imports without calling it: the enumeration asks for coarse verdicts only."""
+UNUSED = {
+    "enumerate_sequences": {"guided_lgp.bounds.path"},
+    "render_reports": {
+        "guided_lgp.policy.arrays",
+        "guided_lgp.policy.paper",
+        "guided_lgp.policy.relational",
+        "guided_lgp.policy.symbols",
+    },
+}
+"""What a stage imports without calling it: the enumeration wants coarse verdicts only, the report
+names and colours of the policies."""
 
 STUDIES = {
     "train": "guided_lgp.studies.train",

@@ -150,7 +150,7 @@ def test_the_readme_lists_every_scene() -> None:
 def test_unknown_names() -> None:
     scene = load_scene(EXAMPLES / "three_boxes.json")
     with pytest.raises(InputError, match="planner: unknown 'fast'"):
-        plan(scene, "(held red)", "fast")  # type: ignore[arg-type]
+        plan(scene, "(held red)", "fast")
     with pytest.raises(InputError, match="policy 'best': is unknown"):
         plan(scene, "(held red)", policy="best")
 

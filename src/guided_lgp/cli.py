@@ -10,7 +10,7 @@ import os
 import shutil
 import signal
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
 from enum import StrEnum
@@ -25,6 +25,7 @@ from guided_lgp import __version__
 from guided_lgp.documents import read_json
 from guided_lgp.errors import InputError, WorkerError
 from guided_lgp.paths import EXAMPLES, MODELS, PARAMS, PLANNING
+from guided_lgp.search.planners import SEARCHES
 
 app = typer.Typer(
     name="guided-lgp",
@@ -63,14 +64,6 @@ class Network(StrEnum):
     PLACE = "place"
 
 
-class Planner(StrEnum):
-    """The planners that need nothing but a scene and, where guided, the trained policy."""
-
-    GUIDED = "guided"
-    BEST_FIRST = "best-first"
-    BREADTH_FIRST = "breadth-first"
-
-
 class Policy(StrEnum):
     """The trained policies."""
 
@@ -84,6 +77,18 @@ _HINTS: Mapping[str | None, str] = {
     "stopped": "--max-nodes raises the limit",
 }
 """What a user can do about the reason for which a search ended."""
+
+
+def _one_of(names: Collection[str]) -> Callable[[str], str]:
+    """A parser of an option that accepts some names only."""
+
+    def parse(word: str) -> str:
+        if word not in names:
+            raise typer.BadParameter(f"{word!r} is not one of {', '.join(names)}")
+        return word
+
+    return parse
+
 
 AsJson = Annotated[
     bool,
@@ -143,13 +148,15 @@ def plan(
         ),
     ],
     planner: Annotated[
-        Planner,
+        str,
         typer.Option(
-            help="How to search. guided: follow the policy, as in the paper; best-first: the "
-            "policy, but going back to any other action where needed; breadth-first: without "
-            "a policy."
+            parser=_one_of(SEARCHES),
+            metavar=f"[{'|'.join(SEARCHES)}]",
+            help="How to search. "
+            + "; ".join(f"{name}: {search.summary}" for name, search in SEARCHES.items())
+            + ".",
         ),
-    ] = Planner.GUIDED,
+    ] = "guided",
     policy: Annotated[
         Policy,
         typer.Option(
@@ -226,18 +233,19 @@ def plan(
         result = search(
             start,
             objective,
-            planner.value,
+            planner,
             policy=policy.value,
             models=models,
             params=load_planning(params),
             max_nodes=max_nodes,
             where=str(scene),
         )
+    followed = SEARCHES[planner].follows_policy
     times = {name: round(value, 3) for name, value in asdict(result.times).items()}
     statistics = {
-        "planner": planner.value,
-        "policy": None if planner is Planner.BREADTH_FIRST else policy.value,
-        "weights": None if planner is Planner.BREADTH_FIRST else _origin(models, MODELS),
+        "planner": planner,
+        "policy": policy.value if followed else None,
+        "weights": _origin(models, MODELS) if followed else None,
         "limits": _origin(params, PLANNING),
         "tree_size": result.tree_size,
         "attempts": 1 + sum(result.reattempts.values()),

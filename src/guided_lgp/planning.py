@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, get_args
 
 from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.errors import InputError
@@ -11,14 +10,15 @@ from guided_lgp.explanation import ObservedBounds, Obstacle
 from guided_lgp.logic import Goal, parse_objective, validate_objective
 from guided_lgp.params import PlanningParams, load_planning
 from guided_lgp.paths import MODELS
-from guided_lgp.policy.registry import load_policy
+from guided_lgp.policy.registry import POLICIES, load_policy
 from guided_lgp.scene import Scene
 from guided_lgp.scene.validate import validate_scene
-from guided_lgp.search import best_first, breadth_first, guided
+from guided_lgp.search.planners import SEARCHES, check_policies
+from guided_lgp.search.policy import Policy
+from guided_lgp.search.problem import Problem
 from guided_lgp.search.result import REASONS, Cause, SearchResult
 
-Planner = Literal["guided", "best-first", "breadth-first"]
-"""Guided LGP of the paper, its complete variant, and the breadth-first baseline."""
+DEFAULT_PLANNER, DEFAULT_POLICY = "guided", "relational"
 
 _OUTCOMES: Mapping[Cause, str] = {
     "infeasible": "infeasible",
@@ -58,9 +58,9 @@ class PlanningResult(SearchResult):
 def plan(
     scene: Scene,
     objective: str | Iterable[Goal | str],
-    planner: Planner = "guided",
+    planner: str = DEFAULT_PLANNER,
     *,
-    policy: str = "relational",
+    policy: str | Policy = DEFAULT_POLICY,
     models: Path = MODELS,
     params: PlanningParams | None = None,
     max_nodes: int | None = None,
@@ -71,8 +71,9 @@ def plan(
     Args:
         scene: robot, tables and boxes, as read by ``load_scene``.
         objective: goals, parsed or as text: ``["(on red green)", "(held blue)"]``.
-        planner: ``guided``, ``best-first`` or ``breadth-first``.
-        policy: ``paper``, ``improved`` or ``relational``; breadth-first needs none.
+        planner: one of :data:`~guided_lgp.search.planners.SEARCHES`.
+        policy: the name of a trained policy, or any object with the method of
+            :class:`~guided_lgp.search.policy.Policy`; some searches need none.
         models: folder with the trained weights; by default, those shipped with the package.
         params: limits of the bounds and of the search (sections ``bounds`` and
             ``compare_scalability``); the shipped ones by default.
@@ -87,8 +88,10 @@ def plan(
     Raises:
         InputError: a fault in the scene, the objective, the names or the models.
     """
-    if planner not in get_args(Planner):
-        raise InputError("planner", f"unknown {planner!r}", ", ".join(get_args(Planner)))
+    check_policies(POLICIES)
+    if planner not in SEARCHES:
+        raise InputError("planner", f"unknown {planner!r}", ", ".join(SEARCHES))
+    search = SEARCHES[planner]
     goals = parse_objective([objective] if isinstance(objective, str) else map(str, objective))
     validate_scene(scene, where)
     validate_objective(goals, scene.symbols, scene.state)
@@ -97,12 +100,11 @@ def plan(
     if max_nodes is not None:
         limits = limits.model_copy(update={"max_tree_size": max_nodes})
     bounds = ObservedBounds(SceneBounds(scene, params.bounds))
-    if planner == "breadth-first":
-        result = breadth_first.plan(scene, goals, scene.symbols, bounds, limits)
+    if not search.follows_policy:
+        followed = None
     else:
-        search = guided.plan if planner == "guided" else best_first.plan
-        networks = load_policy(policy, models)
-        result = search(scene, goals, scene.symbols, bounds, networks, limits)
+        followed = load_policy(policy, models) if isinstance(policy, str) else policy
+    result = search.plan(Problem(scene, goals, limits, bounds, followed))
     return PlanningResult(
         **vars(result),
         solver_starts=bounds.starts,

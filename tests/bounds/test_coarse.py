@@ -9,6 +9,7 @@ from guided_lgp.bounds.results import CoarseResult
 from guided_lgp.bounds.verify import verify_keyframes
 from guided_lgp.logic import Skeleton, applicable_actions, parse_skeleton, progress, successor
 from guided_lgp.poses import tilt
+from guided_lgp.robots import load_robot
 from guided_lgp.scene import Box, PlacedRobot, Scene, Table, generate, pr2
 from guided_lgp.scene.setups import SETUPS
 from guided_lgp.scene.world import World
@@ -215,7 +216,7 @@ def test_further_solutions_are_distinct_and_true(bound: CoarseBound) -> None:
 
 
 def test_the_interpreter_gives_the_same_verdicts(bound: CoarseBound) -> None:
-    slow = CoarseBound(SCENE, 9, Interpreter())
+    slow = CoarseBound(SCENE, 9, Interpreter(load_robot("pr2")))
     verdicts = []
     for skeleton in _random_skeletons(SCENE, 3, 4, seed=3):
         prefixes = [bound.solve(skeleton[:k]) for k in (1, 2, 3)]

@@ -10,22 +10,28 @@ import pytest
 
 from guided_lgp import compiled
 from guided_lgp.bounds.coarse import compiler, solver
-from guided_lgp.bounds.coarse.formulation import Formulator, Margins, SceneGeometry
-from guided_lgp.bounds.coarse.kernels import Kernel, kernels
+from guided_lgp.bounds.coarse.formulation import Formulator
 from guided_lgp.bounds.coarse.solver import Compiled, Interpreter, Settings
 from guided_lgp.bounds.coarse.starts import Starts
+from guided_lgp.bounds.program.geometry import Margins, SceneGeometry
+from guided_lgp.bounds.program.kernels import Kernel
+from guided_lgp.bounds.program.kinematics import kinematics_of
+from guided_lgp.bounds.terms import kernel_table
 from guided_lgp.errors import InputError
 from guided_lgp.logic import parse_skeleton
+from guided_lgp.robots import load_robot
 from guided_lgp.scene import generate, pr2
 
 
 def _compiled() -> Compiled:
-    library = compiler.load_library()
+    library = compiler.load_library(load_robot("pr2"))
     assert library is not None
     return Compiled(library)
 
 
-@pytest.mark.parametrize("kernel", kernels(), ids=lambda kernel: kernel.name)
+@pytest.mark.parametrize(
+    "kernel", kernel_table(kinematics_of(load_robot("pr2"))), ids=lambda kernel: kernel.name
+)
 def test_jacobians_agree_with_finite_differences(kernel: Kernel) -> None:
     rng = np.random.default_rng(0)
     for _ in range(5):
@@ -51,7 +57,7 @@ def test_compiled_and_interpreted_loops_agree(skeleton: str) -> None:
     scene = generate("a", 1, 11, "x").scenes[0]
     geometry, settings = SceneGeometry(scene), Settings(steps=12)
     formulation = Formulator(geometry, Margins()).build(parse_skeleton(skeleton))
-    fast, slow = _compiled(), Interpreter()
+    fast, slow = _compiled(), Interpreter(load_robot("pr2"))
     rng = np.random.default_rng(3)
     start = Starts(geometry, fast).draw(formulation, rng, noise=0.3)
     one = fast.solve(formulation.program, start, settings)
@@ -86,7 +92,7 @@ cp {library} "$2"
 def test_of_two_processes_one_compiles_and_the_other_waits(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    assert compiler.load_library() is not None
+    assert compiler.load_library(load_robot("pr2")) is not None
     library = next(compiled.cache_folder().glob("coarse-*.so"))
     stand_in = tmp_path / "bin" / "cc"
     stand_in.parent.mkdir()
@@ -94,10 +100,14 @@ def test_of_two_processes_one_compiles_and_the_other_waits(
     stand_in.chmod(0o755)
     monkeypatch.setenv("PATH", str(stand_in.parent), prepend=":")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    code = "from guided_lgp.bounds.coarse.compiler import load_library; assert load_library()"
+    code = """
+from guided_lgp.bounds.coarse.compiler import load_library
+from guided_lgp.robots import load_robot
+assert load_library(load_robot("pr2"))
+"""
     both = [subprocess.Popen([sys.executable, "-c", code]) for _ in range(2)]
     assert [process.wait(60) for process in both] == [0, 0]
-    assert compiler.load_library() is not None
+    assert compiler.load_library(load_robot("pr2")) is not None
     assert (tmp_path / "log").read_text().count("compiled") == 1
     assert not list((tmp_path / "cache" / "guided-lgp").glob("tmp*"))
 
@@ -110,7 +120,7 @@ def test_a_cache_folder_that_cannot_be_written_is_named(
     (tmp_path / "file").touch()
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
     with pytest.raises(InputError, match=r"guided-lgp: .*XDG_CACHE_HOME"):
-        compiler.load_library()
+        compiler.load_library(load_robot("pr2"))
 
 
 def test_without_a_compiler_the_interpreter_takes_over_and_says_so_once(
@@ -124,8 +134,8 @@ def test_without_a_compiler_the_interpreter_takes_over_and_says_so_once(
     solver.default_solver.cache_clear()
     try:
         with caplog.at_level(logging.WARNING):
-            assert isinstance(solver.default_solver(), Interpreter)
-            solver.default_solver()
+            assert isinstance(solver.default_solver(load_robot("pr2")), Interpreter)
+            solver.default_solver(load_robot("pr2"))
         assert [record.message.count("no C compiler") for record in caplog.records] == [1]
     finally:
         solver.default_solver.cache_clear()

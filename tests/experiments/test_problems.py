@@ -3,7 +3,7 @@
 import pytest
 
 from guided_lgp.domains import load_domain
-from guided_lgp.experiments.problems import PROBLEMS, Problem
+from guided_lgp.experiments.problems import PROBLEMS, ProblemClass
 from guided_lgp.logic import contradiction, format_objective
 from guided_lgp.logic.strips import facts, goal_facts, relaxed_operators
 from guided_lgp.scene import generate
@@ -23,7 +23,7 @@ def test_counts_and_names() -> None:
 
 
 @pytest.mark.parametrize("problem", PROBLEMS, ids=lambda problem: problem.name)
-def test_objectives_need_the_stated_number_of_actions(problem: Problem) -> None:
+def test_objectives_need_the_stated_number_of_actions(problem: ProblemClass) -> None:
     scene = generate(problem.setup, 1, 0, "x").scenes[0]
     objectives = problem.objectives(scene.symbols.boxes)
     assert len(set(map(frozenset, objectives))) == len(objectives)

@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 
 from guided_lgp.bounds.coarse import CoarseBound
-from guided_lgp.bounds.coarse.formulation import Formulation, Formulator, Margins, SceneGeometry
+from guided_lgp.bounds.coarse.formulation import Formulation, Formulator
 from guided_lgp.bounds.coarse.ipopt import Ipopt
 from guided_lgp.bounds.coarse.solver import Settings, Solution, default_solver
 from guided_lgp.bounds.coarse.starts import Starts
+from guided_lgp.bounds.program.geometry import Margins, SceneGeometry
 from guided_lgp.logic import parse_skeleton
+from guided_lgp.robots import load_robot
 from guided_lgp.scene import Box, Scene, Table
 
 SCENE = Scene(
@@ -39,12 +41,12 @@ def _oracle(skeleton: str) -> tuple[Formulation, Solution]:
     """IPOPT's best point of a few starts."""
     geometry = SceneGeometry(SCENE)
     formulation = Formulator(geometry, Margins()).build(parse_skeleton(skeleton))
-    starts = Starts(geometry, default_solver())
+    starts = Starts(geometry, default_solver(load_robot("pr2")))
     solutions = []
     oracle = None
     for seed in range(_STARTS):
         start = starts.draw(formulation, np.random.default_rng(seed), noise=0.1 * seed)
-        oracle = oracle or Ipopt(formulation.program, start, SETTINGS)
+        oracle = oracle or Ipopt(load_robot("pr2"), formulation.program, start, SETTINGS)
         solutions.append(oracle.solve(start))
         if solutions[-1].converged(SETTINGS):
             break
@@ -57,7 +59,7 @@ def test_ipopt_finds_the_sequences_feasible_that_the_bound_does(skeleton: str) -
     formulation, theirs = _oracle(skeleton)
     assert theirs.violation <= SETTINGS.tolerance
     # and its point is one for our solver: nothing is left to do from there
-    ours = default_solver().solve(formulation.program, theirs.values, SETTINGS)
+    ours = default_solver(load_robot("pr2")).solve(formulation.program, theirs.values, SETTINGS)
     assert ours.steps == 0
 
 

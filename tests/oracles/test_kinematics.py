@@ -4,22 +4,28 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from guided_lgp.bounds.coarse.kinematics import SPHERES, arm_pose, inverse
+from guided_lgp.bounds.program.closed_form import human_like, inverse
+from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.poses import apply, rotation_matrix
 from guided_lgp.poses import inverse as inverse_pose
-from guided_lgp.scene import GRIPPERS, Box, Robot, Scene, Table, pr2
+from guided_lgp.robots import load_robot
+from guided_lgp.scene import GRIPPERS, Box, PlacedRobot, Scene, Table, pr2
 
 TORSO = 0.21
 SCENE = Scene(
-    robot=Robot(torso=TORSO),
+    robot=PlacedRobot(torso=TORSO),
     tables=(Table(name="tab1", position=(0.5, 0.0, 0.6), half_extents=(0.2, 0.2)),),
     boxes=(Box(name="red", size=(0.1, 0.07, 0.1), position=(0.5, 0, 0.65), on="tab1"),),
 )
 
 
+(CHAIN,) = kinematics_of(load_robot("pr2")).chains
+LENGTHS = human_like(CHAIN)
+
+
 def _forward() -> ca.Function:
     q, side, torso = ca.SX.sym("q", 7), ca.SX.sym("side"), ca.SX.sym("torso")
-    arm = arm_pose(q, side, torso)
+    arm = CHAIN.pose(q, side, torso)
     return ca.Function("forward", [q, side, torso], [arm.position, arm.rotation, arm.spheres])
 
 
@@ -34,7 +40,7 @@ def test_forward_kinematics_agree_with_pinocchio(gripper: str) -> None:
         expected = pr2.tool_pose(SCENE, q, gripper)
         assert np.abs(position.ravel() - expected[:3]).max() < 1e-9
         assert np.abs(rotation - rotation_matrix(expected[3:])).max() < 1e-9
-        for sphere, centre in zip(SPHERES, spheres.T, strict=True):
+        for sphere, centre in zip(CHAIN.spheres, spheres.T, strict=True):
             link = pr2.SIDE[gripper] + sphere.link[1:]
             local = apply(inverse_pose(pr2.link_pose(SCENE, q, link)), centre)
             assert np.abs(local - np.array(sphere.centre) * (1, side, 1)).max() < 1e-9
@@ -47,7 +53,7 @@ def test_closed_form_inverse_kinematics_invert_the_forward_ones() -> None:
     closed_form = ca.Function(
         "inverse",
         [position, rotation, pan, branch, side],
-        [inverse(position, rotation, pan, branch, side, TORSO)],
+        [inverse(LENGTHS, position, rotation, pan, branch, side, TORSO)],
     )
     for joints in rng.uniform(*pr2.JOINT_LIMITS[:7].T, size=(100, 7)):
         for hand in (1.0, -1.0):
@@ -66,7 +72,7 @@ def test_closed_form_inverse_kinematics_invert_the_forward_ones() -> None:
 def test_a_target_out_of_reach_reports_the_missing_distance() -> None:
     eye = ca.SX(np.eye(3))
     x = ca.SX.sym("x")
-    solution = inverse(ca.vertcat(x, 0.188, 0.790675 + TORSO), eye, 0.0, 1.0, 1.0, TORSO)
+    solution = inverse(LENGTHS, ca.vertcat(x, 0.188, 0.790675 + TORSO), eye, 0.0, 1.0, 1.0, TORSO)
     missing = ca.Function("missing", [x], [solution[7]])
     # shoulder at x = -0.05, then 0.1 + 0.4 + 0.321 + 0.18 m of arm
     assert float(missing(0.95)) == pytest.approx(0.0, abs=1e-9)

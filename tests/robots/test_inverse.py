@@ -7,7 +7,7 @@ from descriptions import ARMS, TIAGO_PRO, ArmDescription
 from guided_lgp.robots import solvers
 from guided_lgp.robots.chain import Array
 from guided_lgp.robots.inverse import InverseKinematics
-from guided_lgp.robots.solvers import Compiled, InNumpy, best_solver
+from guided_lgp.robots.solvers import EXACT, Compiled, InNumpy, best_solver
 
 _TARGETS = 500
 
@@ -52,8 +52,12 @@ def test_poses_out_of_reach_have_no_solution() -> None:
     for arm in ARMS.values():
         solver, q, redundancy = reachable(arm)
         rotation, position = solver.forward(q)
-        _, valid = solver.inverse(rotation, position + np.array([5.0, 0, 0]), redundancy)
+        far = position + np.array([5.0, 0, 0])
+        _, valid = solver.inverse(rotation, far, redundancy)
         assert not valid.any()
+        nearest, missing = solver.nearest(rotation, far, redundancy)
+        _, reached = solver.forward(nearest)
+        assert np.all(missing >= np.linalg.norm(reached - far[:, None], axis=-1) - 1e-9)
 
 
 def test_solutions_do_not_depend_on_the_company() -> None:
@@ -87,8 +91,9 @@ def test_compiled_and_interpreted_solvers_agree() -> None:
         assert isinstance(best_solver(solver.problem), Compiled)
         value = np.zeros(len(q)) if arm.redundant is None else q[:, arm.redundant]
         poses = solver.forward(q)
-        compiled, exact = best_solver(solver.problem)(*poses, value)
-        interpreted, also_exact = InNumpy(solver.problem)(*poses, value)
+        compiled, missing = best_solver(solver.problem)(*poses, value)
+        interpreted, also_missing = InNumpy(solver.problem)(*poses, value)
+        exact, also_exact = missing < EXACT, also_missing < EXACT
         assert (exact == also_exact).mean() > 0.995  # Newton's method may fork at the last bit
         both = exact & also_exact
         same = np.abs(np.sin((compiled - interpreted)[both] / 2)).max(axis=-1) < 1e-5

@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from guided_lgp.bounds.coarse.kinematics import COARSE_SPHERES, SPHERES
 from guided_lgp.bounds.path.ik import REACH
 from guided_lgp.robots import load_robot
 from guided_lgp.scene import GRIPPERS, pr2
@@ -34,13 +33,9 @@ def test_arms() -> None:
         assert arm.palm_front == pr2.PALM_FRONT
         assert arm.reaches.tobytes() == REACH.tobytes()
         assert arm.redundant == 0
-        assert arm.spheres_between_arms == COARSE_SPHERES
     left, right = ROBOT.arms.values()
     assert (left.mirror_of, right.mirror_of) == (None, "pr2L")
     assert right.signs.tobytes() == pr2.MIRROR.tobytes()
-    assert [(s.link, s.centre, s.radius) for s in left.spheres] == [
-        (s.link, s.centre, s.radius) for s in SPHERES
-    ]
 
 
 def test_fingers() -> None:

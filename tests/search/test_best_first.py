@@ -6,6 +6,7 @@ from guided_lgp.logic import Skeleton, parse_objective, parse_skeleton, progress
 from guided_lgp.params import SearchLimits
 from guided_lgp.scene.model import Scene
 from guided_lgp.search import best_first, breadth_first
+from guided_lgp.search.problem import Problem
 
 TOWER = parse_objective(["(on red green)", "(on green blue)"])
 
@@ -19,7 +20,7 @@ def test_a_uniform_policy_solves_four_actions(scene: Scene) -> None:
         max_depth=4, reattempts=0, max_tree_size=20_000, max_paths=1000, max_sequences=1000
     )
     bounds = ScriptedBounds(scene)
-    result = best_first.plan(scene, TOWER, scene.symbols, bounds, UNIFORM, limits)
+    result = best_first.plan(Problem(scene, TOWER, limits, bounds, UNIFORM))
     assert result.skeleton is not None
     assert len(result.skeleton) == 4
     assert satisfied(progress(scene.state, result.skeleton), TOWER)
@@ -31,15 +32,10 @@ def test_finds_what_breadth_first_finds(scene: Scene, limits: SearchLimits) -> N
     limits = limits.model_copy(update={"max_depth": 3})
     plans = [
         breadth_first.plan(
-            scene, objective, scene.symbols, ScriptedBounds(scene, left_hand_fails), limits
+            Problem(scene, objective, limits, ScriptedBounds(scene, left_hand_fails))
         ),
         best_first.plan(
-            scene,
-            objective,
-            scene.symbols,
-            ScriptedBounds(scene, left_hand_fails),
-            misled,
-            limits,
+            Problem(scene, objective, limits, ScriptedBounds(scene, left_hand_fails), misled)
         ),
     ]
     assert all(plan.solved for plan in plans)
@@ -48,7 +44,7 @@ def test_finds_what_breadth_first_finds(scene: Scene, limits: SearchLimits) -> N
 
 def test_what_begins_with_an_infeasible_step_is_pruned(scene: Scene, limits: SearchLimits) -> None:
     bounds = ScriptedBounds(scene, left_hand_fails)
-    best_first.plan(scene, TOWER, scene.symbols, bounds, UNIFORM, limits)
+    best_first.plan(Problem(scene, TOWER, limits, bounds, UNIFORM))
     assert all(left_hand_fails(skeleton[:-1]) for skeleton in bounds.coarse_asked if skeleton[:-1])
 
 
@@ -56,7 +52,7 @@ def test_nothing_feasible_is_exhausted_not_endless(scene: Scene, limits: SearchL
     bounds = ScriptedBounds(scene, path=lambda skeleton: False)
     limits = limits.model_copy(update={"max_depth": 2})
     result = best_first.plan(
-        scene, parse_objective(["(held red)"]), scene.symbols, bounds, UNIFORM, limits
+        Problem(scene, parse_objective(["(held red)"]), limits, bounds, UNIFORM)
     )
     assert result.reason == "exhausted"
     assert parse_skeleton("(grasp pr2L red)") in bounds.path_asked
@@ -64,7 +60,7 @@ def test_nothing_feasible_is_exhausted_not_endless(scene: Scene, limits: SearchL
 
 def test_same_search_twice(scene: Scene, limits: SearchLimits) -> None:
     first, second = (
-        best_first.plan(scene, TOWER, scene.symbols, ScriptedBounds(scene), UNIFORM, limits)
+        best_first.plan(Problem(scene, TOWER, limits, ScriptedBounds(scene), UNIFORM))
         for _ in range(2)
     )
     assert (first.skeleton, first.tree_size) == (second.skeleton, second.tree_size)
@@ -78,12 +74,7 @@ def test_a_policy_that_goes_in_circles(scene: Scene) -> None:
         max_depth=20, reattempts=0, max_tree_size=400_000, max_paths=1000, max_sequences=1000
     )
     result = best_first.plan(
-        scene,
-        parse_objective(["(on red tab2)"]),
-        scene.symbols,
-        ScriptedBounds(scene),
-        circles,
-        limits,
+        Problem(scene, parse_objective(["(on red tab2)"]), limits, ScriptedBounds(scene), circles)
     )
     assert result.solved
     assert result.tree_size < 500
@@ -97,7 +88,7 @@ def test_no_action_more_than_needed(scene: Scene, limits: SearchLimits) -> None:
     detour = {progress(scene.state, advice[:k]): action for k, action in enumerate(advice)}
     policy = Scorer(lambda objective, state, action: 3.0 * (action == detour.get(state)))
     objective = parse_objective(["(on red green)", "(held blue)"])
-    result = best_first.plan(scene, objective, scene.symbols, ScriptedBounds(scene), policy, limits)
+    result = best_first.plan(Problem(scene, objective, limits, ScriptedBounds(scene), policy))
     assert result.skeleton is not None
     assert len(result.skeleton) == 3
 
@@ -114,7 +105,7 @@ def test_takes_the_detour_that_geometry_asks_for(scene: Scene, limits: SearchLim
 
     bounds = ScriptedBounds(scene, reaches)
     objective = parse_objective(["(on red green)"])
-    result = best_first.plan(scene, objective, scene.symbols, bounds, UNIFORM, limits)
+    result = best_first.plan(Problem(scene, objective, limits, bounds, UNIFORM))
     assert result.skeleton == parse_skeleton(
         "(grasp pr2L red) (place pr2L red tab2) (grasp pr2R red) (place pr2R red green)"
     )
@@ -124,7 +115,7 @@ def test_ends_after_so_many_sequences_without_a_path(scene: Scene, limits: Searc
     bounds = ScriptedBounds(scene, path=lambda skeleton: False)
     limits = limits.model_copy(update={"max_paths": 5})
     result = best_first.plan(
-        scene, parse_objective(["(held red)"]), scene.symbols, bounds, UNIFORM, limits
+        Problem(scene, parse_objective(["(held red)"]), limits, bounds, UNIFORM)
     )
     assert (result.reason, result.path_calls) == ("paths", 5)
     assert "limit of sequences without a path" in result.explanation
@@ -133,6 +124,6 @@ def test_ends_after_so_many_sequences_without_a_path(scene: Scene, limits: Searc
 def test_ends_after_so_many_coarse_bounds(scene: Scene, limits: SearchLimits) -> None:
     bounds = ScriptedBounds(scene, coarse=lambda skeleton: len(skeleton) < 4)
     limits = limits.model_copy(update={"max_sequences": 70})
-    result = best_first.plan(scene, TOWER, scene.symbols, bounds, UNIFORM, limits)
+    result = best_first.plan(Problem(scene, TOWER, limits, bounds, UNIFORM))
     assert (result.reason, result.coarse_calls) == ("coarse", 70)
     assert "limit of sequences for the coarse bound" in result.explanation

@@ -8,6 +8,7 @@ from guided_lgp.logic import Action, Objective, State, parse_objective, parse_sk
 from guided_lgp.params import SearchLimits
 from guided_lgp.scene.model import Scene
 from guided_lgp.search import guided
+from guided_lgp.search.problem import Problem
 
 TOWER = parse_objective(["(on red green)", "(on green blue)"])
 PLAN = parse_skeleton(
@@ -25,7 +26,7 @@ def prefers_plan(objective: Objective, state: State, action: Action) -> float:
 
 def test_follows_a_known_plan(scene: Scene, limits: SearchLimits) -> None:
     bounds = ScriptedBounds(scene)
-    result = guided.plan(scene, TOWER, scene.symbols, bounds, Scorer(prefers_plan), limits)
+    result = guided.plan(Problem(scene, TOWER, limits, bounds, Scorer(prefers_plan)))
     assert result.skeleton == PLAN
     assert result.policy_calls == result.expansions == 4
     assert result.causes == ()
@@ -36,7 +37,7 @@ def test_tree_size_counts_all_children(scene: Scene, limits: SearchLimits) -> No
     objective = parse_objective(["(on red tab2)"])
     likes = parse_skeleton("(grasp pr2R red) (place pr2R red tab2)")
     policy = Scorer(lambda objective, state, action: 2.0 * (action in likes))
-    result = guided.plan(scene, objective, scene.symbols, ScriptedBounds(scene), policy, limits)
+    result = guided.plan(Problem(scene, objective, limits, ScriptedBounds(scene), policy))
     assert result.skeleton == likes
     assert result.tree_size == 1 + 6 + 6
 
@@ -47,7 +48,7 @@ def test_reattempt_after_an_infeasible_step(scene: Scene, limits: SearchLimits) 
     likes |= {"(place pr2L red tab2)": 3.0, "(place pr2R red tab2)": 3.0}
     policy = Scorer(lambda objective, state, action: likes.get(str(action), 0.0))
     bounds = ScriptedBounds(scene, coarse=lambda skeleton: skeleton[-1].gripper == "pr2R")
-    result = guided.plan(scene, objective, scene.symbols, bounds, policy, limits)
+    result = guided.plan(Problem(scene, objective, limits, bounds, policy))
     assert result.skeleton == parse_skeleton("(grasp pr2R red) (place pr2R red tab2)")
     assert result.causes == ("infeasible",)
     assert result.reattempts == {"infeasible": 1, "max_depth": 0}
@@ -59,7 +60,7 @@ def test_reattempt_after_an_infeasible_path(scene: Scene, limits: SearchLimits) 
     likes = {"(grasp pr2L red)": 3.0, "(grasp pr2R red)": 2.0}
     policy = Scorer(lambda objective, state, action: likes.get(str(action), 0.0))
     bounds = ScriptedBounds(scene, path=lambda skeleton: skeleton[0].gripper == "pr2R")
-    result = guided.plan(scene, objective, scene.symbols, bounds, policy, limits)
+    result = guided.plan(Problem(scene, objective, limits, bounds, policy))
     assert result.skeleton == parse_skeleton("(grasp pr2R red)")
     assert result.causes == ("infeasible",)
     assert len(bounds.path_asked) == 2
@@ -71,9 +72,7 @@ def test_maximum_depth_ends_attempts(scene: Scene) -> None:
         max_depth=3, reattempts=2, max_tree_size=20_000, max_paths=1000, max_sequences=1000
     )
     bounds = ScriptedBounds(scene)
-    result = guided.plan(
-        scene, parse_objective(["(held red)"]), scene.symbols, bounds, never, limits
-    )
+    result = guided.plan(Problem(scene, parse_objective(["(held red)"]), limits, bounds, never))
     assert not result.solved
     assert result.reason == "attempts"
     assert result.causes == ("max_depth",) * 3
@@ -86,7 +85,7 @@ def test_failed_nodes_are_never_tried_again(scene: Scene) -> None:
     limits = SearchLimits(
         max_depth=8, reattempts=100, max_tree_size=20_000, max_paths=1000, max_sequences=1000
     )
-    result = guided.plan(scene, TOWER, scene.symbols, bounds, UNIFORM, limits)
+    result = guided.plan(Problem(scene, TOWER, limits, bounds, UNIFORM))
     assert result.reason == "exhausted"
     assert result.tree_size == 7
     assert len(bounds.coarse_asked) == len(set(bounds.coarse_asked)) == 6
@@ -104,18 +103,14 @@ def test_adaptation_encodes_unsatisfied_goals(
         return 2.0 * (action in PLAN[:2])
 
     objective = parse_objective(["(on blue tab1)", "(on green blue)"])  # blue is there already
-    guided.plan(
-        scene, objective, scene.symbols, ScriptedBounds(scene), Scorer(score), limits, adapt
-    )
+    guided.plan(Problem(scene, objective, limits, ScriptedBounds(scene), Scorer(score), adapt))
     assert set(seen) == {objective[1:] if adapt else objective}
 
 
 def test_bad_objectives_are_answered_at_once(scene: Scene, limits: SearchLimits) -> None:
     bounds = ScriptedBounds(scene)
     with pytest.raises(InputError, match="already holds"):
-        guided.plan(
-            scene, parse_objective(["(on red tab1)"]), scene.symbols, bounds, UNIFORM, limits
-        )
+        guided.plan(Problem(scene, parse_objective(["(on red tab1)"]), limits, bounds, UNIFORM))
     assert not bounds.coarse_asked
 
 
@@ -130,6 +125,6 @@ def test_a_reattempt_leaves_the_circle(scene: Scene) -> None:
         max_depth=8, reattempts=1, max_tree_size=20_000, max_paths=1000, max_sequences=1000
     )
     objective = parse_objective(["(on red tab2)"])
-    result = guided.plan(scene, objective, scene.symbols, ScriptedBounds(scene), circles, limits)
+    result = guided.plan(Problem(scene, objective, limits, ScriptedBounds(scene), circles))
     assert result.causes == ("max_depth",)
     assert result.solved

@@ -17,8 +17,9 @@ from guided_lgp.logic import (
 from guided_lgp.logic.strips import facts, goal_facts, relaxed_operators
 from guided_lgp.params import SearchLimits
 from guided_lgp.scene.model import Scene
-from guided_lgp.search import classical, graph
+from guided_lgp.search import best_first, graph
 from guided_lgp.search.landmark_cut import LandmarkCut
+from guided_lgp.search.problem import Problem
 from guided_lgp.search.result import SearchResult
 from guided_lgp.search.tree import StateSpace, distances
 
@@ -26,14 +27,14 @@ LIMITS = SearchLimits(
     max_depth=12, reattempts=0, max_tree_size=400_000, max_paths=1000, max_sequences=1000
 )
 TOWER = parse_objective(["(on red green)", "(on green blue)"])
-RIVALS = [graph.plan, classical.plan]
+RIVALS = [graph.plan, best_first.plan_shortest]
 Planner = Callable[..., SearchResult]
 
 
 @pytest.mark.parametrize("plan", RIVALS)
 def test_shortest_plan_first(plan: Planner, scene: Scene) -> None:
     bounds = ScriptedBounds(scene)
-    result = plan(scene, TOWER, scene.symbols, bounds, LIMITS)
+    result = plan(Problem(scene, TOWER, LIMITS, bounds))
     assert result.skeleton is not None
     assert len(result.skeleton) == 4
     assert satisfied(progress(scene.state, result.skeleton), TOWER)
@@ -48,7 +49,7 @@ def test_next_sequence_when_the_first_fails(plan: Planner, scene: Scene) -> None
         coarse=lambda skeleton: skeleton[-1].gripper == "pr2R",
         path=lambda skeleton: len(skeleton) == 6,
     )
-    result = plan(scene, TOWER, scene.symbols, bounds, LIMITS)
+    result = plan(Problem(scene, TOWER, LIMITS, bounds))
     assert result.skeleton is not None
     assert len(result.skeleton) == 6
     assert {action.gripper for action in result.skeleton} == {"pr2R"}
@@ -61,10 +62,10 @@ def test_next_sequence_when_the_first_fails(plan: Planner, scene: Scene) -> None
 def test_gives_up_with_a_reason(plan: Planner, scene: Scene) -> None:
     bounds = ScriptedBounds(scene, coarse=lambda skeleton: len(skeleton) < 3)
     deep = LIMITS.model_copy(update={"max_depth": 5})
-    result = plan(scene, TOWER, scene.symbols, bounds, deep)
+    result = plan(Problem(scene, TOWER, deep, bounds))
     assert result.reason == "exhausted"
     small = LIMITS.model_copy(update={"max_tree_size": 50})
-    result = plan(scene, TOWER, scene.symbols, ScriptedBounds(scene, lambda _: False), small)
+    result = plan(Problem(scene, TOWER, small, ScriptedBounds(scene, lambda _: False)))
     assert result.reason in {"stopped", "exhausted"}
     assert not result.solved
 
@@ -74,7 +75,7 @@ def test_exclusion_saves_verdicts(scene: Scene) -> None:
         return str(skeleton[0]) == "(grasp pr2R green)"
 
     bounds = ScriptedBounds(scene, coarse=rule)
-    result = classical.plan(scene, TOWER, scene.symbols, bounds, LIMITS)
+    result = best_first.plan_shortest(Problem(scene, TOWER, LIMITS, bounds))
     assert result.skeleton is not None
     first_actions = {skeleton[0] for skeleton in bounds.coarse_asked if not rule(skeleton)}
     asked = [skeleton for skeleton in bounds.coarse_asked if not rule(skeleton)]
@@ -105,6 +106,6 @@ def test_a_layer_ends_at_the_limit_of_the_size() -> None:
     scene = make_scene(5, tray=True)
     objective = parse_objective([f"(on {box} tray)" for box in scene.symbols.boxes])
     limits = LIMITS.model_copy(update={"max_tree_size": 2000})
-    result = graph.plan(scene, objective, scene.symbols, ScriptedBounds(scene), limits)
+    result = graph.plan(Problem(scene, objective, limits, ScriptedBounds(scene)))
     assert result.reason == "stopped"
     assert 2000 <= result.tree_size < 2100

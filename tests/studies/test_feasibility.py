@@ -14,6 +14,7 @@ from guided_lgp.params import Network, SearchLimits, load_params
 from guided_lgp.scene import load_scenes
 from guided_lgp.search import best_first
 from guided_lgp.search.policy import Uniform
+from guided_lgp.search.problem import Problem
 from guided_lgp.studies import evaluate, feasibility
 from guided_lgp.studies.cases import OUTCOMES
 from guided_lgp.studies.classifier import FeasibilityAware, Verdicts, train_classifier
@@ -98,7 +99,7 @@ def test_a_complete_search_stays_complete(outputs: Path) -> None:
     trees = []
     for policy in (Uniform(), FeasibilityAware(Uniform(), classifier)):
         found = best_first.plan(
-            scene, parse_objective(["(on red blue)"]), scene.symbols, bounds, policy, limits
+            Problem(scene, parse_objective(["(on red blue)"]), limits, bounds, policy)
         )
         assert found.reason == "exhausted"
         trees.append((found.tree_size, found.coarse_calls, found.expansions))

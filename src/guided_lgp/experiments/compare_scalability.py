@@ -21,35 +21,17 @@ from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.documents import write_json
 from guided_lgp.experiments.files import write_table
 from guided_lgp.experiments.memory import peak_mb, reset_peak
-from guided_lgp.experiments.problems import PROBLEMS, Problem
-from guided_lgp.logic import Objective, format_objective, format_skeleton
+from guided_lgp.experiments.policies import load_policies
+from guided_lgp.experiments.problems import PROBLEMS
+from guided_lgp.logic import format_objective, format_skeleton
 from guided_lgp.params import BoundsParams, Params, SearchLimits
 from guided_lgp.paths import EVALUATION, METRICS, SCENES, TRAINED
-from guided_lgp.policy.registry import POLICIES, load_policy
 from guided_lgp.scene import Scene, load_scenes
-from guided_lgp.search import best_first, breadth_first, classical, graph, guided
-from guided_lgp.search.bounds import Bounds
-from guided_lgp.search.policy import Policy, Uniform
+from guided_lgp.search.planners import TABLE_3, controls_last
+from guided_lgp.search.problem import Problem
 from guided_lgp.search.result import SearchResult
 
 Row = dict[str, Any]
-
-UNGUIDED: dict[str, Callable[..., SearchResult]] = {
-    "breadth_first": breadth_first.plan,
-    "breadth_first_graph": graph.plan,
-    "astar": classical.plan,
-}
-GUIDED: dict[str, tuple[str, Callable[..., SearchResult]]] = {
-    "guided": ("paper", guided.plan),
-    "guided_best_first": ("paper", best_first.plan),
-    "improved": ("improved", guided.plan),
-    "improved_best_first": ("improved", best_first.plan),
-    "relational": ("relational", guided.plan),
-    "relational_best_first": ("relational", best_first.plan),
-    "uniform_best_first": ("uniform", best_first.plan),
-}
-"""Policy and search of each guided planner. The uniform policy knows nothing: the control that
-shows what the best-first search owes to its bound on the missing actions alone."""
 
 COUNTS = ("expansions", "policy_calls", "coarse_calls", "path_calls")
 TIMES = ("symbolic", "policy", "coarse", "path")
@@ -113,48 +95,32 @@ def compare(task: Task) -> list[Row]:
     """Rows of one task: every objective by every planner."""
     problem = next(problem for problem in PROBLEMS if problem.name == task.problem)
     symbols = task.scene.symbols
+    unguided_symbols = problem.unguided_symbols(symbols)
     bounds = SceneBounds(task.scene, task.bounds)
-    planners = _planners(task, bounds, problem)
+    depth = max(task.limits.max_depth, 2 * problem.k_min)
+    limits = task.limits.model_copy(update={"max_depth": depth})
+    planners = controls_last(TABLE_3.values())
+    policies = load_policies(planners, task.models)
     rows = []
     for objective in problem.objectives(symbols.boxes):
-        for planner, plan in planners.items():
+        for planner in planners:
+            policy = policies.get(planner.policy)
+            restriction = None if policy else unguided_symbols
             reset_peak()
-            result = plan(objective)
+            result = planner.plan(
+                Problem(task.scene, objective, limits, bounds, policy, planner.adapt, restriction)
+            )
             rows.append(
                 {
                     "problem": problem.name,
                     "configuration": task.scene.name,
                     "objective": format_objective(objective),
-                    "planner": planner,
+                    "planner": planner.name,
                     "peak_rss_mb": peak_mb(),
                     **_figures(result),
                 }
             )
     return rows
-
-
-def _planners(
-    task: Task, bounds: Bounds, problem: Problem
-) -> dict[str, Callable[[Objective], SearchResult]]:
-    """Every planner, by name, as a function of the objective alone."""
-    symbols = task.scene.symbols
-    unguided_symbols = problem.unguided_symbols(symbols)
-    policies: dict[str, Policy] = {name: load_policy(name, task.models) for name in POLICIES}
-    policies["uniform"] = Uniform()
-    depth = max(task.limits.max_depth, 2 * problem.k_min)
-    limits = task.limits.model_copy(update={"max_depth": depth})
-
-    def by(
-        policy: Policy, plan: Callable[..., SearchResult]
-    ) -> Callable[[Objective], SearchResult]:
-        return lambda objective: plan(task.scene, objective, symbols, bounds, policy, limits)
-
-    def alone(plan: Callable[..., SearchResult]) -> Callable[[Objective], SearchResult]:
-        return lambda objective: plan(task.scene, objective, unguided_symbols, bounds, limits)
-
-    return {name: by(policies[policy], plan) for name, (policy, plan) in GUIDED.items()} | {
-        name: alone(plan) for name, plan in UNGUIDED.items()
-    }
 
 
 def _figures(result: SearchResult) -> Row:

@@ -9,7 +9,6 @@ has a path, too, is recorded beside it. Objectives that hold at the start are co
 import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +18,7 @@ from guided_lgp import parallel
 from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.documents import write_json
 from guided_lgp.experiments.files import read_table, write_table
+from guided_lgp.experiments.policies import load_policies
 from guided_lgp.logic import (
     Objective,
     Skeleton,
@@ -32,29 +32,15 @@ from guided_lgp.logic import (
 )
 from guided_lgp.params import BoundsParams, Params, SearchLimits
 from guided_lgp.paths import EVALUATION, METRICS, SCENES, SEQUENCES, TRAINED
-from guided_lgp.policy.registry import POLICIES, load_policy
 from guided_lgp.policy.split import training_objectives
 from guided_lgp.scene import Scene, load_scenes
-from guided_lgp.search import best_first, guided
 from guided_lgp.search.bounds import Bounds
-from guided_lgp.search.policy import Policy, Uniform
+from guided_lgp.search.planners import TABLE_1
+from guided_lgp.search.policy import Policy
+from guided_lgp.search.problem import Problem
 from guided_lgp.search.result import SearchResult
 
 Row = dict[str, Any]
-
-PLANNERS: Mapping[str, tuple[str, Callable[..., SearchResult]]] = {
-    "default": ("paper", partial(guided.plan, adapt=False)),
-    "adaptation": ("paper", guided.plan),
-    "best_first": ("paper", best_first.plan),
-    "improved_default": ("improved", partial(guided.plan, adapt=False)),
-    "improved_adaptation": ("improved", guided.plan),
-    "improved_best_first": ("improved", best_first.plan),
-    "relational": ("relational", guided.plan),
-    "relational_best_first": ("relational", best_first.plan),
-    "uniform_best_first": ("uniform", best_first.plan),
-}
-"""Policy and search of each row of Table I; all but the ``default`` ones adapt the objective. The
-uniform policy is the control: what best-first search does without a policy."""
 
 OUTCOMES = ("shortest", "feasible", "no_solution")
 
@@ -148,8 +134,7 @@ def evaluate(task: Task) -> list[Row]:
     """Rows of one configuration: every objective by every planner."""
     symbols = task.scene.symbols
     bounds = SceneBounds(task.scene, task.bounds)
-    policies: dict[str, Policy] = {name: load_policy(name, task.models) for name in POLICIES}
-    policies["uniform"] = Uniform()
+    policies = load_policies(TABLE_1.values(), task.models)
     known = [parse_skeleton(text) for text in task.sequences]
     return [
         row
@@ -173,10 +158,19 @@ def _problem(
         "shortest_length": shortest,
     }
     if satisfied(task.scene.state, objective):
-        return [problem | {"planner": name, "outcome": "trivial"} for name in PLANNERS]
+        return [problem | {"planner": name, "outcome": "trivial"} for name in TABLE_1]
     results = {
-        name: plan(task.scene, objective, task.scene.symbols, bounds, policies[policy], task.limits)
-        for name, (policy, plan) in PLANNERS.items()
+        name: planner.plan(
+            Problem(
+                task.scene,
+                objective,
+                task.limits,
+                bounds,
+                policies[planner.policy],
+                planner.adapt,
+            )
+        )
+        for name, planner in TABLE_1.items()
     }
     found = {len(result.skeleton) for result in results.values() if result.skeleton is not None}
     has_path = None
@@ -229,7 +223,7 @@ def summarize(rows: Sequence[Row]) -> dict[str, dict[str, dict[str, float | int]
             )
             for subset, only in (("all", False), ("unseen", True))
         }
-        for planner in PLANNERS
+        for planner in TABLE_1
     }
 
 

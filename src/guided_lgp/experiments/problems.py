@@ -10,7 +10,7 @@ Boxes = Sequence[str]
 
 
 @dataclass(frozen=True)
-class Problem:
+class ProblemClass:
     """A row of Table II, or of family e."""
 
     name: str
@@ -96,14 +96,14 @@ def _many_boxes(boxes: Boxes) -> list[Objective]:
 
 
 PROBLEMS = (
-    Problem("a.1", "a", "stack boxes on table", 4, _stacks_of_three),
-    Problem("b.1", "b", "place boxes on tray/tab2", 6, _every_assignment, reduced=True),
-    Problem("b.2", "b", "stack boxes on tray", 6, _towers_on_tray),
-    Problem("c.1", "c", "place boxes on tray/tab2", 8, _two_on_tray, reduced=True),
-    Problem("c.2", "c", "stack boxes on tray", 8, _towers_on_tray),
-    Problem("d.1", "d", "place boxes on tray/tab2", 10, _two_on_tray, reduced=True),
-    Problem("d.2", "d", "stack boxes on tray", 10, _towers_on_tray),
-    Problem("e.6", "e6", "towers, splits and both", 12, _many_boxes),
-    Problem("e.8", "e8", "towers, splits and both", 16, _many_boxes),
-    Problem("e.10", "e10", "towers, splits and both", 20, _many_boxes),
+    ProblemClass("a.1", "a", "stack boxes on table", 4, _stacks_of_three),
+    ProblemClass("b.1", "b", "place boxes on tray/tab2", 6, _every_assignment, reduced=True),
+    ProblemClass("b.2", "b", "stack boxes on tray", 6, _towers_on_tray),
+    ProblemClass("c.1", "c", "place boxes on tray/tab2", 8, _two_on_tray, reduced=True),
+    ProblemClass("c.2", "c", "stack boxes on tray", 8, _towers_on_tray),
+    ProblemClass("d.1", "d", "place boxes on tray/tab2", 10, _two_on_tray, reduced=True),
+    ProblemClass("d.2", "d", "stack boxes on tray", 10, _towers_on_tray),
+    ProblemClass("e.6", "e6", "towers, splits and both", 12, _many_boxes),
+    ProblemClass("e.8", "e8", "towers, splits and both", 16, _many_boxes),
+    ProblemClass("e.10", "e10", "towers, splits and both", 20, _many_boxes),
 )

@@ -6,9 +6,10 @@ from typing import Any
 from guided_lgp.experiments.problems import PROBLEMS
 from guided_lgp.report import tables
 from guided_lgp.report.inputs import Metrics
-from guided_lgp.report.style import NETWORKS, PLANNERS, RIVALS
+from guided_lgp.report.style import NETWORKS
 from guided_lgp.report.table import Table
 from guided_lgp.report.tables import NONE, number, percent, search_time, unless_all_solved
+from guided_lgp.search.planners import RIVALS, TABLE_3
 
 PAGE = Path("docs/benchmarks.md")
 
@@ -142,7 +143,7 @@ def _planners(metrics: Metrics) -> Table:
                 for planner in _GUIDED
             ]
         rows.append(tuple(row))
-    names = [PLANNERS[planner] for planner in _GUIDED]
+    names = [TABLE_3[planner].label for planner in _GUIDED]
     return Table(
         "planners",
         "Guided search against each rival: time without the path bound",
@@ -154,7 +155,7 @@ def _planners(metrics: Metrics) -> Table:
             f"1, guided search is faster. {NONE}: nothing solved. (k/n): k of n solved.",
             "Longer problems, on which rivals run into their limits: Table III.",
         ),
-        (("", 4), *((f"{PLANNERS[rival]} takes, times", 2) for rival in rivals)),
+        (("", 4), *((f"{TABLE_3[rival].label} takes, times", 2) for rival in rivals)),
     )
 
 

@@ -12,18 +12,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from guided_lgp.documents import written_whole
-from guided_lgp.experiments.problems import Problem
+from guided_lgp.experiments.problems import ProblemClass
 from guided_lgp.report import paper
 from guided_lgp.report.inputs import Metrics, all_solved, compared
-from guided_lgp.report.style import (
-    PLANNER_STYLES,
-    PLANNERS,
-    POLICIES,
-    POLICY_COLORS,
-    RIVALS,
-    VARIANTS,
-)
+from guided_lgp.report.style import POLICIES, POLICY_COLORS, planner_style
 from guided_lgp.report.tables import search_time
+from guided_lgp.search.planners import RIVALS, TABLE_1, TABLE_3
 
 COLUMN = 3.45
 """Width of a column of a two-column page (in)."""
@@ -137,7 +131,7 @@ def scalability(metrics: Metrics, timing: Metrics, limit: int) -> Figure:
         timing: as ``metrics``.
         limit: of the tree size.
     """
-    panels: dict[str, list[Problem]] = {}
+    panels: dict[str, list[ProblemClass]] = {}
     for problem in compared(metrics):
         panels.setdefault(problem.target.split()[0], []).append(problem)
     quantities = _quantities(metrics, timing)
@@ -166,11 +160,11 @@ _PANELS = {"stack": "Stack boxes", "place": "Place boxes side by side"}
 """Titles of problems by the first word of their target; of others, the target itself."""
 
 
-def _widths(panels: Mapping[str, Sequence[Problem]]) -> list[int]:
+def _widths(panels: Mapping[str, Sequence[ProblemClass]]) -> list[int]:
     return [len({problem.k_min for problem in problems}) for problems in panels.values()]
 
 
-def _log_axes(axis: Axes, problems: Sequence[Problem]) -> None:
+def _log_axes(axis: Axes, problems: Sequence[ProblemClass]) -> None:
     axis.set_xscale("log")
     axis.set_yscale("log")
     lengths = sorted({problem.k_min for problem in problems})
@@ -180,7 +174,7 @@ def _log_axes(axis: Axes, problems: Sequence[Problem]) -> None:
 
 def _against_k(
     axis: Axes,
-    problems: Sequence[Problem],
+    problems: Sequence[ProblemClass],
     quantity: Quantity,
     metrics: Metrics,
     spread: bool = True,
@@ -189,10 +183,10 @@ def _against_k(
 
     A white dot marks the mean of a planner that leaves problems of that K unsolved.
     """
-    for rank, (planner, name) in enumerate(PLANNERS.items()):
-        style: dict[str, Any] = PLANNER_STYLES[planner]
+    for rank, (planner, row) in enumerate(TABLE_3.items()):
+        style: dict[str, Any] = planner_style(row)
         # Side by side, so that equal figures do not hide each other.
-        side = rank - (len(PLANNERS) - 1) / 2
+        side = rank - (len(TABLE_3) - 1) / 2
         known: dict[int, list[Mapping[str, Any]]] = {}
         for problem in problems:
             cell = quantity.source[problem.name].get(planner)
@@ -209,7 +203,9 @@ def _against_k(
             )
             # On a log axis an error bar cannot reach zero.
             bars = (np.minimum(errors, 0.9 * values), errors) if spread else None
-            axis.errorbar(lengths, values, bars, elinewidth=0.7, capsize=1.5, label=name, **style)
+            axis.errorbar(
+                lengths, values, bars, elinewidth=0.7, capsize=1.5, label=row.label, **style
+            )
             partial = [
                 any(
                     not all_solved(metrics[p.name][planner])
@@ -234,12 +230,12 @@ def _against_k(
                 markersize=8,
                 markeredgewidth=0.9,
                 linestyle="none",
-                label=f"{name} (paper)",
+                label=f"{row.label} (paper)",
                 zorder=1.5,
             )
 
 
-def _limit(axis: Axes, problems: Sequence[Problem], metrics: Metrics, limit: int) -> None:
+def _limit(axis: Axes, problems: Sequence[ProblemClass], metrics: Metrics, limit: int) -> None:
     """Mark the limit of the tree size, and which planners without a policy met it where."""
     axis.axhline(limit, color="#999999", linewidth=0.8, linestyle=":")
     for planner in RIVALS:
@@ -249,7 +245,7 @@ def _limit(axis: Axes, problems: Sequence[Problem], metrics: Metrics, limit: int
             stopped,
             [limit] * len(stopped),
             "x",
-            color=PLANNER_STYLES[planner]["color"],
+            color=planner_style(TABLE_3[planner])["color"],
             markersize=6,
         )
 
@@ -258,7 +254,7 @@ def _planner_legend(figure: Figure, axes: np.ndarray) -> None:
     handles: dict[str, Any] = {}
     for axis in axes.flat:
         handles = dict(zip(*reversed(axis.get_legend_handles_labels()), strict=True)) | handles
-    labels = [f"{name}{origin}" for name in PLANNERS.values() for origin in ("", " (paper)")]
+    labels = [f"{row.label}{origin}" for row in TABLE_3.values() for origin in ("", " (paper)")]
     shown = [label for label in labels if label in handles]
     figure.legend([handles[label] for label in shown], shown, loc="outside lower center", ncols=4)
 
@@ -271,9 +267,9 @@ def success(problems: pd.DataFrame) -> Figure:
         problems: columns planner, kind (type of objective) and outcome, one row per problem
             that is not satisfied at the start.
     """
-    planners = [name for name in VARIANTS if name in set(problems["planner"])]
-    policies = list(dict.fromkeys(VARIANTS[name].policy for name in planners))
-    rows_of = [[n for n in planners if VARIANTS[n].policy == policy] for policy in policies]
+    planners = [name for name in TABLE_1 if name in set(problems["planner"])]
+    policies = list(dict.fromkeys(TABLE_1[name].policy for name in planners))
+    rows_of = [[n for n in planners if TABLE_1[n].policy == policy] for policy in policies]
     kinds = sorted(set(problems["kind"]), key=lambda kind: (kind.count("+"), kind))
     figure, axes = _subplots(
         len(policies),
@@ -286,7 +282,7 @@ def success(problems: pd.DataFrame) -> Figure:
     for axis in axes.flat:
         axis.set_visible(False)
     for planner in planners:
-        variant = VARIANTS[planner]
+        variant = TABLE_1[planner]
         number = policies.index(variant.policy)
         place = rows_of[number].index(planner)
         axis = axes[number][place]
@@ -306,7 +302,7 @@ def success(problems: pd.DataFrame) -> Figure:
                 height=0.72,
             )
             left += column.to_numpy()
-        axis.set_title(f"{POLICIES[variant.policy]}:\n{variant.search}")
+        axis.set_title(f"{POLICIES[variant.policy]}:\n{variant.strategy}")
         axis.set_yticks(
             range(len(kinds)), [f"{kind} (n = {counts.get(kind, 0)})" for kind in kinds]
         )

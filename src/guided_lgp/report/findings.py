@@ -3,12 +3,13 @@
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 
-from guided_lgp.experiments.problems import Problem
+from guided_lgp.experiments.problems import ProblemClass
 from guided_lgp.report import paper
 from guided_lgp.report.analysis import NEW, RENAMED, SEEN
 from guided_lgp.report.inputs import Metrics, all_solved, compared
-from guided_lgp.report.style import GUIDED, PLANNERS, POLICIES, RIVALS, VARIANTS
+from guided_lgp.report.style import POLICIES
 from guided_lgp.report.tables import number, percent, search_time
+from guided_lgp.search.planners import GUIDED, RIVALS, TABLE_1, TABLE_3
 
 AIM_SPEEDUP = 50
 """How much faster than breadth-first guided search should be on the longest problem that
@@ -24,17 +25,17 @@ def generalization(metrics: Metrics, calls: Mapping[str, float]) -> list[str]:
     """
     sentences = []
     for policy, name in POLICIES.items():
-        variants = [v for v in VARIANTS if v in metrics and VARIANTS[v].policy == policy]
+        variants = [v for v in TABLE_1 if v in metrics and TABLE_1[v].policy == policy]
         if not variants:
             continue
         parts = [
-            f"{_shortest(metrics[v])} ({VARIANTS[v].search}; "
+            f"{_shortest(metrics[v])} ({TABLE_1[v].strategy}; "
             f"{percent(metrics[v]['all']['no_solution'])} without a solution{_calls(calls.get(v))})"
             for v in variants
         ]
         sentences.append(f"{name}: shortest solutions, all / unseen objectives: {_join(parts)}.")
     missed = [
-        f"{VARIANTS[v].search}, {subset}: {percent(metrics[v][subset]['shortest'])} against "
+        f"{TABLE_1[v].strategy}, {subset}: {percent(metrics[v][subset]['shortest'])} against "
         f"{percent(printed[subset]['shortest'])}"
         for v, printed in paper.GENERALIZATION.items()
         if v in metrics
@@ -157,7 +158,7 @@ def _solved(metrics: Metrics) -> Iterator[str]:
         (beyond, "problems of 6 to 10 boxes"),
     ):
         complete, partial = [], []
-        for planner, label in PLANNERS.items():
+        for planner, row in TABLE_3.items():
             cells = {
                 p.name: metrics[p.name][planner] for p in problems if planner in metrics[p.name]
             }
@@ -167,16 +168,16 @@ def _solved(metrics: Metrics) -> Iterator[str]:
                 if not all_solved(cell)
             ]
             if cells and not missing:
-                complete.append(label)
+                complete.append(row.label)
             elif planner in GUIDED and missing:
-                partial.append(f"{label} solves {_join(missing)}")
+                partial.append(f"{row.label} solves {_join(missing)}")
         if complete:
             yield f"All {which} are solved, with a verified path, by {_join(complete)}."
         if partial:
             yield f"Not all {which}: {'; '.join(partial)}."
 
 
-def _printed_and_beyond(metrics: Metrics) -> tuple[list[Problem], list[Problem]]:
+def _printed_and_beyond(metrics: Metrics) -> tuple[list[ProblemClass], list[ProblemClass]]:
     """The problems of which the paper prints figures, and the others."""
     problems = compared(metrics)
     return (
@@ -195,7 +196,8 @@ def _many_boxes(metrics: Metrics, timing: Metrics) -> Iterator[str]:
     own = [cell["relational"] for cell in cells]
     seconds = [search_time(timing[problem.name]["relational"]) for problem in problems]
     solved = [
-        f"{PLANNERS[planner]} solves {_join([str(c[planner]['problems_solved']) for c in cells])}"
+        f"{TABLE_3[planner].label} solves "
+        f"{_join([str(c[planner]['problems_solved']) for c in cells])}"
         for planner in ("relational", *RIVALS)
         if all(planner in cell for cell in cells)
     ]
@@ -258,7 +260,7 @@ def _beaten(metrics: Metrics, figures: Mapping[str, Mapping[str, float | None]])
         parts = [f"Guided on {_join(wins)}"] if wins else []
         parts += [f"every guided planner on {_join(best)}"] if best else []
         if parts:
-            yield f"{PLANNERS[rival]} (than {', than '.join(parts)})"
+            yield f"{TABLE_3[rival].label} (than {', than '.join(parts)})"
 
 
 def _join(parts: list[str]) -> str:

@@ -10,10 +10,11 @@ import pandas as pd
 from guided_lgp.documents import read_json
 from guided_lgp.errors import InputError
 from guided_lgp.experiments.files import read_table
-from guided_lgp.experiments.problems import PROBLEMS, Problem
+from guided_lgp.experiments.problems import PROBLEMS, ProblemClass
 from guided_lgp.paths import EVALUATION, METRICS, REPORTS, SCENES, SEQUENCES, TRAINING
-from guided_lgp.report.style import NETWORKS, VARIANTS
+from guided_lgp.report.style import NETWORKS
 from guided_lgp.scene import GeneratedScenes, load_scenes
+from guided_lgp.search.planners import TABLE_1
 
 Metrics = Mapping[str, Any]
 
@@ -105,7 +106,7 @@ def load_inputs(root: Path) -> Inputs:
         for split in ("training", "test")
     ]
     generalization = read_object(metrics / "generalization.json", "evaluate_generalization")
-    evaluated = {variant.policy for name, variant in VARIANTS.items() if name in generalization}
+    evaluated = {variant.policy for name, variant in TABLE_1.items() if name in generalization}
     stage = "compare_scalability"
     runs = _frame(root / EVALUATION / "scalability.parquet", stage, _RUNS)
     scalability = mask_stopped(read_object(metrics / "scalability.json", stage), runs)
@@ -139,7 +140,7 @@ def load_inputs(root: Path) -> Inputs:
     )
 
 
-def compared(scalability: Metrics) -> list[Problem]:
+def compared(scalability: Metrics) -> list[ProblemClass]:
     """The problems of the metrics, in the order of Table II, family e last."""
     return [problem for problem in PROBLEMS if problem.name in scalability]
 

@@ -14,9 +14,10 @@ from guided_lgp.paths import METRICS, REPORTS
 from guided_lgp.report import paper
 from guided_lgp.report.figures import STYLE, save
 from guided_lgp.report.inputs import Metrics, all_solved, compared, read_object
-from guided_lgp.report.style import PLANNER_STYLES, PLANNERS
+from guided_lgp.report.style import planner_style
 from guided_lgp.report.table import Table
 from guided_lgp.report.tables import number, percent, search_time
+from guided_lgp.search.planners import TABLE_3
 
 BEGIN = "<!-- findings: written by make repro -->"
 END = "<!-- end of findings -->"
@@ -92,7 +93,7 @@ def winners(metrics: Metrics, timing: Metrics) -> Table:
     rows = []
     for problem in compared(metrics):
         cells = metrics[problem.name]
-        complete = [name for name in PLANNERS if name in cells and all_solved(cells[name])]
+        complete = [name for name in TABLE_3 if name in cells and all_solved(cells[name])]
         nodes = {name: cells[name]["tree_size_mean"] for name in complete}
         seconds = {name: search_time(timing[problem.name][name]) for name in complete}
         rows.append(
@@ -123,7 +124,9 @@ def _first(figures: Mapping[str, float], decimals: int) -> str:
     if not figures:
         return "–"
     least = number(min(figures.values()), decimals)
-    names = [PLANNERS[name] for name, value in figures.items() if number(value, decimals) == least]
+    names = [
+        TABLE_3[name].label for name, value in figures.items() if number(value, decimals) == least
+    ]
     return f"{'; '.join(names) if len(names) <= _NAMED else f'{len(names)} planners'}: {least}"
 
 
@@ -140,8 +143,8 @@ def solved(metrics: Metrics) -> Figure:
                 total[0] += cell["problems_solved"]
                 total[1] += cell["problems"]
         shares = [done / given for done, given in counts.values()]
-        style: dict[str, Any] = PLANNER_STYLES[planner] | {"linestyle": "-"}
-        axis.plot(list(counts), shares, label=PLANNERS[planner], **style)
+        style: dict[str, Any] = planner_style(TABLE_3[planner]) | {"linestyle": "-"}
+        axis.plot(list(counts), shares, label=TABLE_3[planner].label, **style)
     axis.set_xlabel("Smallest number of actions $K$ (two per box)")
     axis.set_ylabel("Problems solved")
     axis.yaxis.set_major_formatter(PercentFormatter(1.0))
@@ -214,7 +217,7 @@ def _many(metrics: Metrics) -> str:
     for planner in SHOWN:
         cells = [cells[planner] for cells in beyond if planner in cells]
         done, given = (sum(cell[key] for cell in cells) for key in ("problems_solved", "problems"))
-        counts.append(f"{PLANNERS[planner]} {done}")
+        counts.append(f"{TABLE_3[planner].label} {done}")
     return (
         f"Of {given} problems of 6 to 10 boxes, solved with a verified path: {'; '.join(counts)}."
     )

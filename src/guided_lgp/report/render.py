@@ -18,8 +18,8 @@ from guided_lgp.policy.split import training_objectives
 from guided_lgp.report import analysis, figures, tables
 from guided_lgp.report.contents import compose, sentences
 from guided_lgp.report.inputs import Inputs, Metrics, compared, load_inputs
-from guided_lgp.report.style import GUIDED, PLANNERS, RIVALS
 from guided_lgp.report.table import Table
+from guided_lgp.search.planners import GUIDED, RIVALS, TABLE_3
 from guided_lgp.view.pictures import draw_scene
 from guided_lgp.view.replay import replay_html
 
@@ -157,7 +157,8 @@ def _replays(inputs: Inputs, bounds: BoundsParams, reports: Path) -> list[tuple[
             if trajectory is not None:
                 address = f"replays/{setup}.html"
                 replay_html(trajectory, scene, reports / address)
-                text = f"{plan.objective}: {len(actions)} actions, {PLANNERS[str(plan.planner)]}"
+                planner = TABLE_3[str(plan.planner)].label
+                text = f"{plan.objective}: {len(actions)} actions, {planner}"
                 written.append((address, f"Problem {plan.problem}, {text}"))
                 break
     return written

@@ -8,12 +8,13 @@ from typing import Any
 
 import pandas as pd
 
-from guided_lgp.experiments.problems import Problem
+from guided_lgp.experiments.problems import ProblemClass
 from guided_lgp.report import paper
 from guided_lgp.report.analysis import NEW, RENAMED, SEEN
 from guided_lgp.report.inputs import Metrics, all_solved, compared
-from guided_lgp.report.style import NETWORKS, PLANNERS, POLICIES, VARIANTS
+from guided_lgp.report.style import NETWORKS, POLICIES
 from guided_lgp.report.table import Table
+from guided_lgp.search.planners import TABLE_1, TABLE_3
 
 NONE = "–"
 """Stands where there is no figure."""
@@ -59,7 +60,7 @@ def generalization(metrics: Metrics, calls: Mapping[str, float]) -> Table:
         calls: by planner, mean number of policy calls per action of the plan.
     """
     rows, records = [], []
-    for name, variant in VARIANTS.items():
+    for name, variant in TABLE_1.items():
         if name not in metrics:
             continue
         sources = {"ours": metrics[name]}
@@ -76,7 +77,7 @@ def generalization(metrics: Metrics, calls: Mapping[str, float]) -> Table:
             rows.append(
                 (
                     POLICIES[variant.policy],
-                    variant.search,
+                    variant.strategy,
                     source,
                     *(percent(subsets[subset][key]) for key in _SHARES for subset in _SUBSETS),
                     number(shown, 2),
@@ -166,15 +167,15 @@ def unseen(shares: pd.DataFrame, novelty: Mapping[str, str]) -> Table:
     counts = Counter(novelty.values())
     kinds = [kind for kind in (SEEN, RENAMED, NEW) if counts[kind]]
     cells = shares.set_index(["planner", "kind"])["shortest"]
-    planners = [name for name in VARIANTS if name in set(shares["planner"])]
+    planners = [name for name in TABLE_1 if name in set(shares["planner"])]
     return Table(
         "unseen",
         "Shortest solutions by how new the objective is",
         ("Policy", "Search", *(f"{counts[kind]} objectives" for kind in kinds)),
         tuple(
             (
-                POLICIES[VARIANTS[name].policy],
-                VARIANTS[name].search,
+                POLICIES[TABLE_1[name].policy],
+                TABLE_1[name].strategy,
                 *(percent(cells.get((name, kind))) for kind in kinds),
             )
             for name in planners
@@ -205,10 +206,10 @@ def scalability(metrics: Metrics, timing: Metrics) -> list[Table]:
 
 
 def _planners(metrics: Metrics) -> list[str]:
-    return [name for name in PLANNERS if any(name in row for row in metrics.values())]
+    return [name for name in TABLE_3 if any(name in row for row in metrics.values())]
 
 
-def label(problem: Problem) -> str:
+def label(problem: ProblemClass) -> str:
     """The problem's name, starred as in the paper."""
     return f"{problem.name}*" if problem.reduced else problem.name
 
@@ -236,7 +237,7 @@ def _comparison(quantity: str, metrics: Metrics, figures: Metrics) -> Table:
                 cell = (printed or {}).get(planner, {})
                 cells.append("" if printed is None else spread(cell.get(mean), cell.get(std)))
                 records.append(_record(problem, planner, "paper", cell.get(mean), cell.get(std)))
-            rows.append((PLANNERS[planner], "paper", *cells))
+            rows.append((TABLE_3[planner].label, "paper", *cells))
         cells = []
         for problem in problems:
             cell = metrics[problem.name].get(planner)
@@ -249,7 +250,7 @@ def _comparison(quantity: str, metrics: Metrics, figures: Metrics) -> Table:
                 _record(problem, planner, "ours", shown[mean], shown[std])
                 | {"n": cell["problems"], "solved": cell["problems_solved"]}
             )
-        rows.append((PLANNERS[planner], "ours", *cells))
+        rows.append((TABLE_3[planner].label, "ours", *cells))
     groups: dict[str, int] = {}
     for problem in problems:
         heading = f"K = {problem.k_min}"
@@ -278,7 +279,7 @@ def _count(cells: Metrics) -> str:
 
 
 def _record(
-    problem: Problem, planner: str, source: str, mean: float | None, std: float | None
+    problem: ProblemClass, planner: str, source: str, mean: float | None, std: float | None
 ) -> dict[str, object]:
     return {
         "problem": problem.name,
@@ -308,7 +309,7 @@ def _details(metrics: Metrics, timing: Metrics) -> Table:
             rows.append(
                 (
                     label(problem),
-                    PLANNERS[planner],
+                    TABLE_3[planner].label,
                     f"{cell['problems_solved']}/{cell['problems']}",
                     number(cell["plan_length_mean"]),
                     number(cell["policy_calls_mean"]),

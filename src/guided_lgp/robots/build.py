@@ -1,16 +1,30 @@
 """A robot from its file: the file's values, and what the description says besides."""
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
 from guided_lgp.errors import InputError
-from guided_lgp.poses import Array, quaternion
+from guided_lgp.poses import Array, quaternion, rotation_matrix
 from guided_lgp.robots.description import Description, find_description
-from guided_lgp.robots.document import ArmDocument, RobotDocument, ToolDocument, read_document
-from guided_lgp.robots.robot import Arm, Fingers, Gap, Robot, Sphere
+from guided_lgp.robots.document import (
+    ArmDocument,
+    FingersDocument,
+    RobotDocument,
+    ToolDocument,
+    read_document,
+)
+from guided_lgp.robots.measures import ArmMeasures
+from guided_lgp.robots.mirror import mirror_of
+from guided_lgp.robots.robot import Arm, Fingers, Gap, Robot, Sphere, TurningGap
 
 _TWO_TURNS = (-2 * np.pi, 2 * np.pi)
+_MIRROR_ERROR = 1e-3
+"""How far (m) the tools of two arms may be apart that are said to be mirror images."""
+
+T = TypeVar("T")
 
 
 def read_robot(file: Path) -> Robot:
@@ -24,7 +38,7 @@ def read_robot(file: Path) -> Robot:
     _check(document, description)
     arms, joint, finger = {}, 0, sum(len(arm.joints) for arm in document.arms.values())
     for gripper, arm in document.arms.items():
-        arms[gripper] = _arm(gripper, arm, description, document.acceleration, joint, finger)
+        arms[gripper] = _arm(gripper, arm, document, description, joint, finger)
         joint += len(arm.joints)
         finger += len(arm.fingers.joints)
     return Robot(file.stem, description, document.base_link, document.fixed_joints, arms)
@@ -45,23 +59,28 @@ def _check(document: RobotDocument, description: Description) -> None:
         description.require_joints(f"{where}.fingers.joints", *arm.fingers.joints)
         description.require_links(f"{where}.tool.link", arm.tool.link)
         description.require_links(f"{where}.hand_links", *arm.hand_links)
-        description.require_links(f"{where}.segments.ends", *arm.segments.ends)
-        description.require_links(f"{where}.spheres", *arm.spheres)
+        if arm.segments is not None:
+            description.require_links(f"{where}.segments.ends", *arm.segments.ends)
+        description.require_links(f"{where}.spheres", *(arm.spheres or ()))
     _ = description.disabled_pairs
 
 
 def _arm(
     gripper: str,
     arm: ArmDocument,
+    robot: RobotDocument,
     description: Description,
-    acceleration: float,
     joint: int,
     finger: int,
 ) -> Arm:
     joints = [description.joints[name] for name in arm.joints]
-    signs = np.array(arm.signs or np.ones(len(joints)), float)
     velocity = np.array([joint.velocity for joint in joints])
-    moved = description.solid_links_below(arm.joints[0])
+    tool_in_link = _tool_in_link(arm.tool, description.where, gripper)
+    measures = _measures(arm, robot, description, tool_in_link)
+    segments = arm.segments or measures.segments
+    spheres = _spheres(arm, measures)
+    between = arm.spheres_between_arms
+    signs = _signs(gripper, arm, robot, description, measures)
     return Arm(
         gripper=gripper,
         joints=arm.joints,
@@ -69,48 +88,104 @@ def _arm(
         home=signs * np.array(arm.home),
         limits=np.array([joint.limits or _TWO_TURNS for joint in joints]),
         velocity_limits=velocity,
-        acceleration_limits=acceleration * velocity,
+        acceleration_limits=robot.acceleration * velocity,
         redundant=None if arm.redundant is None else arm.joints.index(arm.redundant),
         mirror_of=arm.mirrors,
         signs=signs,
         tool_link=arm.tool.link,
-        tool_in_link=_tool_in_link(arm.tool, description.where, gripper),
-        palm_front=arm.tool.palm_front,
+        tool_in_link=tool_in_link,
+        palm_front=_stated(arm.tool.palm_front, lambda: measures.hand.palm_front),
+        links=measures.links,
+        hand_links=arm.hand_links,
+        hand_radius=_stated(arm.hand_radius, lambda: measures.hand.radius),
+        segment_ends=segments.ends,
+        segment_radius=segments.radius,
+        lever_arms=np.array(_stated(arm.lever_arms, lambda: measures.lever_arms)),
+        reaches=np.array(_stated(arm.reaches, lambda: measures.reaches)),
+        spheres=spheres,
+        spheres_between_arms=tuple(range(len(spheres))) if between is None else between,
+        fingers=_fingers(arm.fingers, measures, description, finger),
+    )
+
+
+def _stated(value: T | None, derived: Callable[[], T]) -> T:
+    """What the file states, or else what the description tells."""
+    return derived() if value is None else value
+
+
+def _measures(
+    arm: ArmDocument, robot: RobotDocument, description: Description, tool_in_link: Array
+) -> ArmMeasures:
+    moved = description.solid_links_below(arm.joints[0])
+    return ArmMeasures(
+        urdf=description.urdf,
+        root=robot.base_link,
+        joints=arm.joints,
+        tool=(arm.tool.link, rotation_matrix(tool_in_link[3:]), tool_in_link[:3]),
         links=tuple(link for link in moved if link not in arm.hand_links),
         hand_links=arm.hand_links,
-        hand_radius=arm.hand_radius,
-        segment_ends=arm.segments.ends,
-        segment_radius=arm.segments.radius,
-        lever_arms=np.array(arm.lever_arms),
-        reaches=np.array(arm.reaches),
-        spheres=_spheres(arm),
-        spheres_between_arms=arm.spheres_between_arms,
-        fingers=_fingers(arm, description, finger),
+        fingers=_ratios(arm.fingers, description),
+        finger_limits=_finger_limits(arm.fingers, description),
     )
 
 
-def _fingers(arm: ArmDocument, description: Description, first: int) -> Fingers:
-    stated = arm.fingers
-    joints = [description.joints[name] for name in stated.joints]
-    lower, upper = joints[0].limits or _TWO_TURNS
+def _signs(
+    gripper: str,
+    arm: ArmDocument,
+    robot: RobotDocument,
+    description: Description,
+    measures: ArmMeasures,
+) -> Array:
+    """Signs of the joints towards the mirrored arm: stated, or found where the arms agree."""
+    if arm.mirrors is None:
+        return np.ones(len(arm.joints))
+    if arm.signs:
+        return np.array(arm.signs, float)
+    original = robot.arms[arm.mirrors]
+    tool = _tool_in_link(original.tool, description.where, arm.mirrors)
+    mirror = mirror_of(_measures(original, robot, description, tool).chain, measures.chain)
+    if mirror is None or mirror.error > _MIRROR_ERROR:
+        where = f"{description.where}: arms.{gripper}.mirrors"
+        raise InputError(where, f"is no mirror image of {arm.mirrors}", "an arm of its own")
+    return mirror.signs
+
+
+def _ratios(fingers: FingersDocument, description: Description) -> dict[str, float]:
+    mimics = [description.joints[name].mimic for name in fingers.joints]
+    return dict(zip(fingers.joints, fingers.ratios or mimics, strict=True))
+
+
+def _finger_limits(fingers: FingersDocument, description: Description) -> tuple[float, float]:
+    if not fingers.joints:
+        return 0.0, 0.0
+    return description.joints[fingers.joints[0]].limits or _TWO_TURNS
+
+
+def _fingers(
+    stated: FingersDocument, measures: ArmMeasures, description: Description, first: int
+) -> Fingers:
+    lower, upper = measures.finger_limits
+    gap: Gap = measures.hand if stated.gap is None else TurningGap(**stated.gap.model_dump())
+    velocities = [description.joints[name].velocity for name in stated.joints]
     return Fingers(
         joints=stated.joints,
-        ratios=np.array([joint.mimic for joint in joints]),
-        slice=slice(first, first + len(joints)),
+        ratios=np.array(list(measures.fingers.values())),
+        slice=slice(first, first + len(stated.joints)),
         lower=lower,
         upper=upper,
-        velocity=joints[0].velocity,
-        lever=stated.lever,
-        grasp_width=stated.grasp_width,
-        gap=Gap(stated.gap.sine, stated.gap.cosine, stated.gap.offset),
+        velocity=velocities[0] if velocities else np.inf,
+        lever=_stated(stated.lever, lambda: measures.hand.lever),
+        grasp_width=_stated(stated.grasp_width, lambda: measures.grasp_width),
+        gap=gap,
     )
 
 
-def _spheres(arm: ArmDocument) -> tuple[Sphere, ...]:
-    side = 1.0 if arm.mirrors is None else -1.0
+def _spheres(arm: ArmDocument, measures: ArmMeasures) -> tuple[Sphere, ...]:
+    stated = arm.spheres
+    side = -1.0 if arm.mirrors is not None and stated is not None else 1.0
     return tuple(
         Sphere(link, (x, side * y, z), radius)
-        for link, spheres in arm.spheres.items()
+        for link, spheres in (measures.spheres if stated is None else stated).items()
         for x, y, z, radius in spheres
     )
 

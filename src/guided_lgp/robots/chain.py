@@ -72,6 +72,14 @@ class Chain:
             position=rotation @ self.position + position,
         )
 
+    def extended(self, rotation: Array, position: Array) -> "Chain":
+        """The same chain with the tool frame at a pose in the present one."""
+        return replace(
+            self,
+            rotation=self.rotation @ rotation,
+            position=self.position + self.rotation @ position,
+        )
+
     def forward(self, q: Array) -> tuple[Array, Array]:
         """Rotation (..., 3, 3) and origin (..., 3) of the tool frame.
 

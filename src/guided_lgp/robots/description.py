@@ -1,5 +1,6 @@
 """A robot's description: its URDF and SRDF, found and made ready for PyBullet and pinocchio."""
 
+import json
 import os
 import tempfile
 import xml.etree.ElementTree as ET
@@ -16,6 +17,7 @@ import numpy as np
 from guided_lgp.errors import InputError
 from guided_lgp.paths import DESCRIPTIONS
 from guided_lgp.robots.document import DescriptionFiles
+from guided_lgp.robots.pairs import sampled_pairs
 
 _STL_FACET = np.dtype([("normal", "<f4", 3), ("vertices", "<f4", (3, 3)), ("attribute", "<u2")])
 _STL_HEADER = 84
@@ -46,6 +48,8 @@ class Description:
     srdf: Path | None
     packages: Mapping[str, Path]
     """Folders for ``package://NAME``; others are looked for above the URDF."""
+    soft_limits: bool
+    """Whether the limits of safety controllers count."""
 
     @cached_property
     def _root(self) -> ET.Element:
@@ -119,11 +123,13 @@ class Description:
     def disabled_pairs(self) -> frozenset[frozenset[str]]:
         """Pairs of links that are not checked for self-collision: those of the SRDF.
 
+        Without one, neighbours, and pairs that collide always or never in random configurations.
+
         Raises:
             InputError: the SRDF cannot be read, or names a link that the URDF does not have.
         """
         if self.srdf is None:
-            return frozenset()
+            return self._sampled_pairs
         where = f"{self.where}: description.srdf"
         try:
             root = ET.parse(self.srdf).getroot()
@@ -136,6 +142,16 @@ class Description:
         for link in (link for pair in pairs for link in pair if link not in self.links):
             raise InputError(where, f"disables collisions of unknown link {link}", f"{self.source}")
         return frozenset(map(frozenset, pairs))
+
+    @cached_property
+    def _sampled_pairs(self) -> frozenset[frozenset[str]]:
+        """Sampled once per content of the description, and kept beside its copy."""
+        file = self.urdf.with_suffix(".pairs.json")
+        if not file.exists():
+            ranges = {name: joint.limits or (-np.pi, np.pi) for name, joint in self.joints.items()}
+            pairs = sorted(sorted(pair) for pair in sampled_pairs(self.urdf, ranges))
+            _write(file, json.dumps(pairs).encode())
+        return frozenset(map(frozenset, json.loads(file.read_text(encoding="utf-8"))))
 
     def require_links(self, field: str, *links: str) -> None:
         """Check that the URDF has some links.
@@ -180,6 +196,12 @@ class Description:
             if not {"lower", "upper"} <= stated.keys():
                 raise InputError(str(self.source), f"joint {joint.get('name')} has no limits")
             limits = float(stated["lower"]), float(stated["upper"])
+            safety = joint.find("safety_controller")
+            if self.soft_limits and safety is not None:
+                limits = (
+                    max(limits[0], float(safety.get("soft_lower_limit", limits[0]))),
+                    min(limits[1], float(safety.get("soft_upper_limit", limits[1]))),
+                )
         return JointDescription(
             limits,
             float(stated.get("velocity", "inf")),
@@ -226,6 +248,7 @@ def find_description(where: Path, stated: DescriptionFiles) -> Description:
         source=found("urdf", stated.urdf),
         srdf=None if stated.srdf is None else found("srdf", stated.srdf),
         packages={name: where.parent / folder for name, folder in stated.packages.items()},
+        soft_limits=stated.limits == "soft",
     )
 
 
@@ -279,12 +302,21 @@ def _cached(name: str, suffix: str, content: bytes) -> Path:
     base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     target = Path(base) / "guided-lgp" / f"{name}-{sha256(content).hexdigest()[:16]}.{suffix}"
     if not target.exists():
-        try:
-            target.parent.mkdir(parents=True, exist_ok=True)
-            with tempfile.NamedTemporaryFile(dir=target.parent, delete=False) as file:
-                file.write(content)
-            Path(file.name).replace(target)
-        except OSError as error:
-            fault = error.strerror or "cannot be written"
-            raise InputError(str(target.parent), fault, "a writable $XDG_CACHE_HOME") from None
+        _write(target, content)
     return target
+
+
+def _write(target: Path, content: bytes) -> None:
+    """Write a file of the cache folder, atomically.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(dir=target.parent, delete=False) as file:
+            file.write(content)
+        Path(file.name).replace(target)
+    except OSError as error:
+        fault = error.strerror or "cannot be written"
+        raise InputError(str(target.parent), fault, "a writable $XDG_CACHE_HOME") from None

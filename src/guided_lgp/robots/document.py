@@ -33,6 +33,8 @@ class DescriptionFiles(_Document):
     """An installed Python package that ships the files."""
     packages: dict[str, str] = {}
     """Folders for ``package://NAME`` in the URDF, where they are not above it."""
+    limits: Literal["soft", "hard"] = "soft"
+    """Whether joints keep inside the limits of the URDF's safety controllers, as real arms do."""
 
 
 class FixedJoint(_Document):
@@ -53,8 +55,8 @@ class ToolDocument(_Document):
     """The link's axis that points out of the palm."""
     closing: Axis
     """The link's axis along which the fingers close."""
-    palm_front: Number
-    """Of the palm along the approach, from the frame's origin."""
+    palm_front: Number | None = None
+    """Of the palm along the approach, from the frame's origin. Derived: of the palm's shape."""
 
 
 class GapDocument(_Document):
@@ -68,12 +70,16 @@ class GapDocument(_Document):
 class FingersDocument(_Document):
     """The joints that open a hand; all follow the first one, by the URDF's mimic factors."""
 
-    joints: tuple[str, ...]
-    gap: GapDocument
-    lever: Length
-    """How far a fingertip moves per rad (or m) of the joints."""
-    grasp_width: Length
-    """Widest side of an object that the fingers close across."""
+    joints: tuple[str, ...] = ()
+    """None for jaws that do not move."""
+    ratios: tuple[Number, ...] = ()
+    """What each joint makes of the first one's value. Derived: the URDF's mimic factors."""
+    gap: GapDocument | None = None
+    """Derived: of the fingers' shapes."""
+    lever: Length | None = None
+    """How far a fingertip moves per rad (or m) of the joints. Derived: of the fingers' shapes."""
+    grasp_width: Length | None = None
+    """Widest side of an object that the fingers close across. Derived: 5 mm less than the gap."""
 
 
 class SegmentsDocument(_Document):
@@ -91,7 +97,7 @@ class ArmDocument(_Document):
     """The arm of which this one is the mirror image at the plane y = 0 of the base. All else is
     that arm's, its names with the own side; values are the mirrored arm's."""
     signs: tuple[Literal[-1, 1], ...] = ()
-    """They turn joint values of one arm into the mirror image with the other."""
+    """They turn joint values of one arm into the mirror image with the other. Derived."""
     joints: Names
     home: tuple[Number, ...]
     redundant: str | None = None
@@ -99,18 +105,20 @@ class ArmDocument(_Document):
     tool: ToolDocument
     hand_links: Names
     """The palm first."""
-    hand_radius: Length
-    """Reach of the open hand beyond its tool frame, sideways."""
-    segments: SegmentsDocument
-    fingers: FingersDocument
-    lever_arms: tuple[Number, ...]
-    """How far each joint moves the tool frame per rad, at most."""
-    reaches: tuple[Number, ...]
-    """How far each joint moves a point of hand or held box per rad; the metric of paths."""
-    spheres: dict[str, tuple[tuple[Number, Number, Number, Length], ...]]
-    """By link: centre in the link's frame, and radius."""
-    spheres_between_arms: tuple[int, ...] = ()
-    """Which of them stand for the arm against another arm."""
+    hand_radius: Length | None = None
+    """Reach of the open hand beyond its tool frame, sideways. Derived: of its shapes."""
+    segments: SegmentsDocument | None = None
+    """Derived: the links between neighbouring joints."""
+    fingers: FingersDocument = FingersDocument()
+    lever_arms: tuple[Number, ...] | None = None
+    """How far each joint moves the tool frame per rad, at most. Derived."""
+    reaches: tuple[Number, ...] | None = None
+    """How far each joint moves a point of hand or held box per rad; the metric of paths. Derived:
+    the lever arms and 15 cm."""
+    spheres: dict[str, tuple[tuple[Number, Number, Number, Length], ...]] | None = None
+    """By link: centre in the link's frame, and radius. Derived: around the links' shapes."""
+    spheres_between_arms: tuple[int, ...] | None = None
+    """Which of them stand for the arm against another arm. Derived: all."""
 
     @model_validator(mode="before")
     @classmethod
@@ -120,11 +128,10 @@ class ArmDocument(_Document):
 
     @model_validator(mode="after")
     def _one_value_per_joint(self) -> Self:
-        mirrored = ("signs",) if self.mirrors is not None else ()
-        for field in ("home", "lever_arms", "reaches", *mirrored):
-            count = len(getattr(self, field))
-            if count != len(self.joints):
-                raise ValueError(f"{field} has {count} values for {len(self.joints)} joints")
+        for field in ("home", "lever_arms", "reaches", "signs"):
+            values = getattr(self, field)
+            if values and len(values) != len(self.joints):
+                raise ValueError(f"{field} has {len(values)} values for {len(self.joints)} joints")
         if self.redundant is not None and self.redundant not in self.joints:
             accepted = ", ".join(self.joints)
             raise ValueError(f"redundant {self.redundant} is no joint of the arm ({accepted})")

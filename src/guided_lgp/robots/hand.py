@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import pinocchio as pin
 
 from guided_lgp.errors import InputError
 from guided_lgp.robots.chain import Array
@@ -30,13 +29,23 @@ class HandShape:
     palm_front: float
     """x of the palm's front in the tool frame (m)."""
     values: Array
-    """(k,) values of the finger joints (rad or m), from closed to open."""
+    """(k,) values of the finger joints (rad or m), from closed to open; one for fixed jaws."""
     gaps: Array
     """(k,) distances between the fingers there (m)."""
+    radius: float
+    """Reach (m) of the open hand beyond the tool frame's x axis."""
+    lever: float
+    """How far (m) a point of the fingers moves at most per unit of the value."""
+
+    @property
+    def opened(self) -> float:
+        """The value at which the fingers are widest open."""
+        return float(self.values[-1])
 
     def gap(self, value: float) -> float:
         """Distance (m) between the fingers at a value of the finger joints."""
-        return float(np.interp(value, self.values, self.gaps))
+        order = np.argsort(self.values)
+        return float(np.interp(value, self.values[order], self.gaps[order]))
 
     def value(self, gap: float) -> float:
         """Value of the finger joints, within their limits, that opens the fingers so far (m)."""
@@ -58,21 +67,28 @@ def measure_hand(
         links: palm and fingers.
         fingers: the joints that open the hand, and what each makes of their common value: a factor.
             None for jaws that do not move.
-        limits: of the common value, closed and open.
+        limits: of the common value.
 
     Raises:
         InputError: the links have no palm, or not a finger on either side of the tool.
     """
     hand = _Hand(urdf, tool, links, fingers)
-    opened = hand.shapes(limits[1])
-    sides = [_side(shape) for shape in opened]
-    if sorted(set(sides)) != [-1, 0, 1]:
+    closed, opened = sorted(limits, key=lambda value: _spread(hand.shapes(value)))
+    widest = hand.shapes(opened)
+    sides = [_side(shape) for shape in widest]
+    if set(sides) != {-1, 0, 1}:
         accepted = "a palm and a finger on either side of the tool frame's plane y = 0"
         raise InputError("robot", f"hand links {', '.join(links)}", accepted)
-    palm = max(shape[:, 0].max() for shape, side in zip(opened, sides, strict=True) if side == 0)
-    values = np.linspace(*limits, _STEPS) if fingers else np.array([limits[1]])
-    gaps = np.array([_gap(hand.shapes(value), sides) for value in values])
-    return HandShape(float(palm), values, gaps)
+    palm = max(shape[:, 0].max() for shape, side in zip(widest, sides, strict=True) if side == 0)
+    values = np.linspace(closed, opened, _STEPS) if fingers else np.array([opened])
+    shapes = [hand.shapes(value) for value in values]
+    return HandShape(
+        palm_front=float(palm),
+        values=values,
+        gaps=np.array([_gap(shape, sides) for shape in shapes]),
+        radius=float(np.linalg.norm(np.concatenate(widest)[:, 1:], axis=1).max()),
+        lever=_lever(shapes, values),
+    )
 
 
 class _Hand:
@@ -83,6 +99,8 @@ class _Hand:
         links: Sequence[str],
         fingers: Mapping[str, float],
     ) -> None:
+        import pinocchio as pin  # heavy: only where a robot is measured
+
         self._model = pin.buildModelFromUrdf(str(urdf))
         self._data = self._model.createData()
         self._tool = self._model.getFrameId(tool[0]), pin.SE3(tool[1], tool[2])
@@ -98,6 +116,8 @@ class _Hand:
 
     def shapes(self, value: float) -> list[Array]:
         """Vertices of all shapes in the tool frame, at a value of the finger joints."""
+        import pinocchio as pin
+
         q = pin.neutral(self._model)
         for index, factor in self._fingers.items():
             q[index] = factor * value
@@ -106,6 +126,20 @@ class _Hand:
         tool = self._data.oMf[frame] * offset
         placements = [(tool.actInv(self._data.oMf[link]), v) for link, v in self._hulls]
         return [v @ place.rotation.T + place.translation for place, v in placements]
+
+
+def _spread(shapes: Sequence[Array]) -> float:
+    """How far (m) the hand reaches along y."""
+    return float(np.ptp(np.concatenate(shapes)[:, 1]))
+
+
+def _lever(shapes: Sequence[Sequence[Array]], values: Array) -> float:
+    """The fastest motion of a vertex from one value to the next, per unit of the value."""
+    if len(values) == 1:
+        return 0.0
+    points = np.array([np.concatenate(hand) for hand in shapes])
+    ways = np.linalg.norm(np.diff(points, axis=0), axis=-1).max(axis=1)
+    return float((ways / np.abs(np.diff(values))).max())
 
 
 def _side(shape: Array) -> int:

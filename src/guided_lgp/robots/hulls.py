@@ -4,10 +4,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import coal
 import numpy as np
-import pinocchio as pin
-from scipy.spatial import ConvexHull
 
 from guided_lgp.robots.chain import Array
 
@@ -23,6 +20,8 @@ def link_hulls(urdf: Path) -> dict[str, tuple[Array, ...]]:
     Round shapes are replaced by prisms and polyhedra around them. The paths of meshes in the file
     must be plain.
     """
+    import pinocchio as pin  # heavy: only where a robot is measured
+
     model = pin.buildModelFromUrdf(str(urdf))
     shapes = pin.buildGeomFromUrdf(model, str(urdf), pin.GeometryType.COLLISION)
     hulls: dict[str, list[Array]] = {}
@@ -35,6 +34,8 @@ def link_hulls(urdf: Path) -> dict[str, tuple[Array, ...]]:
 
 
 def _vertices(shape: Any) -> Array:
+    import coal
+
     if isinstance(shape, coal.BVHModelBase):
         shape.buildConvexHull(True, "Qt")
         shape = shape.convex
@@ -81,6 +82,8 @@ def between(vertices: Array, axis: Array, low: float, high: float) -> Array:
         low: of the first plane, along the axis (m).
         high: of the second.
     """
+    from scipy.spatial import ConvexHull
+
     heights = vertices @ axis
     inside = vertices[(heights >= low - _ON_PLANE) & (heights <= high + _ON_PLANE)]
     triangles = ConvexHull(vertices).simplices

@@ -369,7 +369,7 @@ static void forward(const Arm *arm, const double *q, Matrix rotation, Vector pos
 }
 
 /* What is missing from a pose to another; returns its length. */
-static double missing(Matrix turned, const Vector origin, Matrix rotation, const Vector position,
+static double difference(Matrix turned, const Vector origin, Matrix rotation, const Vector position,
                       double out[6]) {
     Matrix back, rest;
     transposed(turned, back);
@@ -453,24 +453,24 @@ static void step(const Arm *arm, double *q, const Vector position, const double 
         if (i != arm->redundant) q[i] += share * change[k++];
 }
 
-/* Newton's method where q is near a solution; whether it is one. */
-static int polish(const Arm *arm, double *q, Matrix rotation, const Vector position) {
+/* Newton's method where q is near a solution; what is missing in the end. */
+static double polish(const Arm *arm, double *q, Matrix rotation, const Vector position) {
     Matrix turned;
     Vector origin;
     double error[6], size = INFINITY;
     for (int i = 0; i <= arm->iterations; i++) {
         forward(arm, q, turned, origin);
-        size = missing(turned, origin, rotation, position, error);
+        size = difference(turned, origin, rotation, position, error);
         if (!(size > arm->exact / 10) || i == arm->iterations) break;
         if (i == 0 && !(size < arm->capture)) break;
         step(arm, q, origin, error, size);
     }
-    return size < arm->exact;
+    return size;
 }
 
 /* Solve for poses; see InverseKinematics.inverse. */
 void inverse(const Arm *arm, int count, const double *rotations, const double *positions,
-             const double *values, double *solutions, unsigned char *exact) {
+             const double *values, double *solutions, double *missing) {
     Vector w[6], p[6], shift;
     Matrix rotation, motion;
     double guesses[8][6];
@@ -489,7 +489,7 @@ void inverse(const Arm *arm, int count, const double *rotations, const double *p
             const double *guess = arm->structure >= 0 ? guesses[branch] : arm->starts + 6 * branch;
             for (int i = 0, k = 0; i < arm->joints; i++)
                 q[i] = i == arm->redundant ? values[n] : guess[k++];
-            exact[n * arm->branches + branch] = polish(arm, q, rotation, position);
+            missing[n * arm->branches + branch] = polish(arm, q, rotation, position);
         }
     }
 }

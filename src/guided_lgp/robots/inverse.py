@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guided_lgp.robots.chain import Array, Chain
-from guided_lgp.robots.solvers import Problem, best_solver, free_screws
+from guided_lgp.robots.solvers import EXACT, Problem, best_solver, free_screws
 from guided_lgp.robots.structures import Structure, closest
 
 _NEARLY = 0.05
@@ -59,14 +59,26 @@ class InverseKinematics:
             q (..., branches, n) in rad and valid (..., branches): the tool is there and all joints
             are within their limits.
         """
+        q, missing = self.nearest(rotation, position, redundancy)
+        inside = np.all((q >= self._limits[:, 0]) & (q <= self._limits[:, 1]), axis=-1)
+        return q, inside & (missing < EXACT)
+
+    def nearest(
+        self, rotation: Array, position: Array, redundancy: Array | float = 0.0
+    ) -> tuple[Array, Array]:
+        """Like :meth:`inverse`, but the nearest values where there is no solution.
+
+        Returns:
+            q (..., branches, n) in rad, perhaps beyond limits, and missing (..., branches): how far
+            (m, rad) the tool is from its pose.
+        """
         value = np.asarray(redundancy, float)
         shape = np.broadcast_shapes(rotation.shape[:-2], position.shape[:-1], value.shape)
         rotation = np.broadcast_to(rotation, (*shape, 3, 3)).reshape(-1, 3, 3)
         position = np.broadcast_to(position, (*shape, 3)).reshape(-1, 3)
-        q, exact = self._solver(rotation, position, np.broadcast_to(value, shape).ravel())
+        q, missing = self._solver(rotation, position, np.broadcast_to(value, shape).ravel())
         q = self._within_turns(q)
-        valid = exact & np.all((q >= self._limits[:, 0]) & (q <= self._limits[:, 1]), axis=-1)
-        return q.reshape(*shape, *q.shape[1:]), valid.reshape(*shape, -1)
+        return q.reshape(*shape, *q.shape[1:]), missing.reshape(*shape, -1)
 
     def follow(self, q: Array, valid: NDArray[np.bool_], branch: int) -> Array | None:
         """The solutions along a path as one motion that begins on a branch.

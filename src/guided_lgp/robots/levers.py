@@ -1,7 +1,6 @@
 """How far a turn of each joint can move the tool."""
 
 import numpy as np
-from scipy.optimize import minimize
 
 from guided_lgp.robots.chain import Array, Chain
 
@@ -20,6 +19,8 @@ def lever_arms(chain: Chain) -> Array:
 
 
 def _shortest_way(chain: Chain, first: int) -> float:
+    from scipy.optimize import minimize
+
     axes, points = chain.axes[first:], chain.points[first:]
 
     def length(slides: Array, smooth: float = 0.0) -> float:

@@ -1,14 +1,12 @@
 """Which pairs of a robot's links are not checked for collisions."""
 
-import xml.etree.ElementTree as ET
 from collections.abc import Collection, Mapping
 from itertools import combinations
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
-from guided_lgp.errors import InputError
 from guided_lgp.robots.chain import Array, read_joints
 
 Pairs = frozenset[frozenset[str]]
@@ -19,23 +17,6 @@ _ALWAYS = 0.98
 """Share of them from which on a pair is said to collide always."""
 
 
-def stated_pairs(srdf: Path, links: Collection[str]) -> Pairs:
-    """The pairs that an SRDF disables.
-
-    Raises:
-        InputError: the file cannot be read, or names a link that the robot does not have.
-    """
-    try:
-        root = ET.parse(srdf).getroot()
-    except (OSError, ET.ParseError) as error:
-        raise InputError(str(srdf), f"is not a readable SRDF: {error}") from None
-    pairs = [(p.get("link1", ""), p.get("link2", "")) for p in root.iter("disable_collisions")]
-    for link in (link for pair in pairs for link in pair):
-        if link not in links:
-            raise InputError(str(srdf), f"unknown link {link}", "links of the URDF")
-    return frozenset(frozenset(pair) for pair in pairs)
-
-
 def sampled_pairs(urdf: Path, limits: Mapping[str, tuple[float, float]]) -> Pairs:
     """Pairs of neighbours, and those that collide always or never.
 
@@ -43,6 +24,8 @@ def sampled_pairs(urdf: Path, limits: Mapping[str, tuple[float, float]]) -> Pair
         urdf: the description's file, with plain paths of meshes.
         limits: ranges (rad or m) of the joints that move; the others stay at zero.
     """
+    import pinocchio as pin  # heavy: only where there is no SRDF
+
     model = pin.buildModelFromUrdf(str(urdf))
     geometry = _hulls(model, urdf)
     collisions = np.zeros(len(geometry.collisionPairs))
@@ -58,8 +41,10 @@ def sampled_pairs(urdf: Path, limits: Mapping[str, tuple[float, float]]) -> Pair
     return frozenset(settled | _neighbours(urdf, share))
 
 
-def _hulls(model: pin.Model, urdf: Path) -> pin.GeometryModel:
+def _hulls(model: Any, urdf: Path) -> Any:
     """The links' shapes, meshes as their hulls, with all pairs of different links."""
+    import pinocchio as pin
+
     geometry = pin.buildGeomFromUrdf(model, str(urdf), pin.GeometryType.COLLISION)
     for body in geometry.geometryObjects:
         if hasattr(body.geometry, "buildConvexHull"):
@@ -71,12 +56,14 @@ def _hulls(model: pin.Model, urdf: Path) -> pin.GeometryModel:
     return geometry
 
 
-def _link(model: pin.Model, geometry: pin.GeometryModel, body: int) -> str:
+def _link(model: Any, geometry: Any, body: int) -> str:
     return str(model.frames[geometry.geometryObjects[body].parentFrame].name)
 
 
-def _configurations(model: pin.Model, limits: Mapping[str, tuple[float, float]]) -> Array:
+def _configurations(model: Any, limits: Mapping[str, tuple[float, float]]) -> Array:
     """Random configurations (samples, nq)."""
+    import pinocchio as pin
+
     random = np.random.default_rng(0)
     full = np.tile(pin.neutral(model), (_SAMPLES, 1))
     for name in sorted(limits):

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
@@ -13,8 +14,20 @@ from guided_lgp.robots.document import FixedJoint
 from guided_lgp.robots.kinematics import Kinematics
 
 
+class Gap(Protocol):
+    """How far two fingers are apart, over the value of their joints."""
+
+    def gap(self, value: float) -> float:
+        """Distance (m) at a value (rad or m)."""
+        ...
+
+    def value(self, gap: float) -> float:
+        """Value at a distance (m)."""
+        ...
+
+
 @dataclass(frozen=True)
-class Gap:
+class TurningGap:
     """Distance of two fingertips that turn together: ``sine sin a + cosine cos a + offset`` (m)."""
 
     sine: float

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from guided_lgp.compiled import load_compiled
 from guided_lgp.robots import subproblems as sub
@@ -54,10 +53,8 @@ class Problem:
 class Solver(Protocol):
     """Solves N poses."""
 
-    def __call__(
-        self, rotation: Array, position: Array, value: Array
-    ) -> tuple[Array, NDArray[np.bool_]]:
-        """Joints (N, branches, n) and whether the tool is there (N, branches).
+    def __call__(self, rotation: Array, position: Array, value: Array) -> tuple[Array, Array]:
+        """Joints (N, branches, n) and what is missing to the pose (N, branches) in m or rad.
 
         Args:
             rotation: (N, 3, 3) of the tool frame.
@@ -115,16 +112,14 @@ class Compiled:
         self._shape = problem.branches, len(chain)
         self._inverse = library.inverse
 
-    def __call__(
-        self, rotation: Array, position: Array, value: Array
-    ) -> tuple[Array, NDArray[np.bool_]]:
+    def __call__(self, rotation: Array, position: Array, value: Array) -> tuple[Array, Array]:
         """See :class:`Solver`."""
         poses = [np.ascontiguousarray(array) for array in (rotation, position, value)]
         q = np.empty((len(value), *self._shape))
-        exact = np.empty(q.shape[:2], dtype=bool)
-        pointers = [ctypes.c_void_p(array.ctypes.data) for array in (*poses, q, exact)]
+        missing = np.empty(q.shape[:2])
+        pointers = [ctypes.c_void_p(array.ctypes.data) for array in (*poses, q, missing)]
         self._inverse(ctypes.byref(self._arm), len(value), *pointers)
-        return q, exact
+        return q, missing
 
 
 class InNumpy:
@@ -135,9 +130,7 @@ class InNumpy:
         self._chain = problem.chain
         self._free = np.array(problem.free)
 
-    def __call__(
-        self, rotation: Array, position: Array, value: Array
-    ) -> tuple[Array, NDArray[np.bool_]]:
+    def __call__(self, rotation: Array, position: Array, value: Array) -> tuple[Array, Array]:
         """See :class:`Solver`."""
         q = np.empty((len(value), self._problem.branches, len(self._chain)))
         q[...] = value[:, None, None]
@@ -150,8 +143,8 @@ class InNumpy:
         poses = np.repeat(rotation, count, axis=0), np.repeat(position, count, axis=0)
         return q, self._polish(q.reshape(-1, q.shape[-1]), *poses).reshape(q.shape[:2])
 
-    def _polish(self, q: Array, rotation: Array, position: Array) -> NDArray[np.bool_]:
-        """Improve q (k, n) in place where it is near a solution; whether it is one."""
+    def _polish(self, q: Array, rotation: Array, position: Array) -> Array:
+        """Improve q (k, n) in place where it is near a solution; what is missing in the end."""
         error = np.linalg.norm(_error(*self._chain.forward(q), rotation, position), axis=-1)
         active = np.flatnonzero((error > EXACT / 10) & (error < self._problem.capture))
         for _ in range(self._problem.iterations):
@@ -161,10 +154,10 @@ class InNumpy:
             turned, origin, jacobian = self._chain.jacobian(q[active])
             step = _newton(_error(turned, origin, *target), jacobian[..., self._free])
             q[np.ix_(active, self._free)] += step
-            missing = _error(*self._chain.forward(q[active]), *target)
-            error[active] = np.linalg.norm(missing, axis=-1)
+            rest = _error(*self._chain.forward(q[active]), *target)
+            error[active] = np.linalg.norm(rest, axis=-1)
             active = active[error[active] > EXACT / 10]
-        return np.asarray(error < EXACT)
+        return np.asarray(error)
 
 
 def free_screws(

@@ -1,9 +1,4 @@
-"""Planners: one module each, all on the same two bounds and, where guided, the same policy.
+"""Planners: one row each in :mod:`guided_lgp.search.planners`, all on the same two bounds.
 
-Every planner is a function ``plan(scene, objective, symbols, bounds, ..., limits)`` that returns a
-:class:`SearchResult`.
+A search is a function ``plan(problem: Problem) -> SearchResult``.
 """
-
-from guided_lgp.search.result import SearchResult
-
-__all__ = ["SearchResult"]

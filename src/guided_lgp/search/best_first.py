@@ -1,78 +1,53 @@
-"""Guided LGP, best-first: the policy as the heuristic of a complete search (beyond the paper)."""
+"""Best-first search: A*, and guided LGP with the policy as the heuristic of a complete search."""
 
-from collections import Counter
 from heapq import heappop, heappush
 
-from guided_lgp.logic import Objective, State, Symbols, least_actions
-from guided_lgp.params import SearchLimits
-from guided_lgp.scene import Scene
-from guided_lgp.search.bounds import Bounds
-from guided_lgp.search.guided import GuidedTree, Node
-from guided_lgp.search.policy import Policy
+from guided_lgp.search.estimates import Estimate, LandmarkEstimate, PolicyEstimate, Rank
+from guided_lgp.search.problem import Problem
 from guided_lgp.search.result import SearchResult
-
-DETOUR = 2.0
-"""Cost (nats) of every action that brings no goal nearer.
-
-By the policy alone, short plans and few expansions exclude each other: the summed log p favours
-short sequences, and on long tasks, where equally good actions split the probability, it expands
-all that is shorter first; the discrepancy expands little and takes a few more actions now and then.
-"""
-
-REVISIT = 3.0
-"""Cost (nats) for every node expanded before with the same symbolic state.
-
-It postpones other orders of the same actions without excluding them: another way to the same
-symbolic state may be the one that is geometrically feasible.
-"""
+from guided_lgp.search.skeleton_tree import Node, SkeletonTree
 
 
-def plan(
-    scene: Scene,
-    objective: Objective,
-    symbols: Symbols,
-    bounds: Bounds,
-    policy: Policy,
-    limits: SearchLimits,
-    adapt: bool = True,
-) -> SearchResult:
-    """Take the cheapest node of a frontier that keeps every child.
+def plan(problem: Problem) -> SearchResult:
+    """Guided LGP, best-first: the policy ranks the nodes (beyond the paper)."""
+    return search(SkeletonTree(problem), PolicyEstimate(problem))
 
-    A node costs its discrepancy, :data:`DETOUR` per action, made or still missing at least, and
-    :data:`REVISIT`. A sequence whose coarse bound is infeasible is pruned with all that begins with
-    it. Complete up to ``limits.max_depth``: whatever has a feasible sequence is found, unless
-    another limit ends the search before. Equal costs: deeper first, then older first.
 
-    Raises:
-        InputError: the objective is contradictory, unknown or already satisfied.
+def plan_shortest(problem: Problem) -> SearchResult:
+    """A*: landmark-cut ranks the nodes, and the first plan found is one of the shortest."""
+    return search(SkeletonTree(problem), LandmarkEstimate(problem))
+
+
+def search(tree: SkeletonTree, estimate: Estimate) -> SearchResult:
+    """Take the node of the lowest rank from a frontier that keeps every child.
+
+    Equal states are not merged: the first sequence to a state may be geometrically infeasible. A
+    sequence whose coarse bound is infeasible is pruned when its turn comes, with all that begins
+    with it. Complete up to ``limits.max_depth``: whatever has a feasible sequence is found, unless
+    another limit ends the search before. Equal ranks: older first.
     """
-    tree = GuidedTree(scene, objective, symbols, bounds, policy, adapt)
-    run = tree.run
-    visits: Counter[State] = Counter()
+    max_depth = tree.problem.limits.max_depth
 
-    def entry(node: Node) -> tuple[float, int, int, Node]:
-        depth = len(node.skeleton)
-        length = depth + least_actions(node.state, objective)
-        cost = -node.discrepancy + DETOUR * length + REVISIT * visits[node.state]
-        return cost, -depth, node.number, node
+    def entry(node: Node) -> tuple[Rank, int, Node]:
+        return estimate.rank(node), node.number, node
 
     frontier = [entry(tree.root)]
     while frontier:
-        if limit := run.limit_reached(tree.size, limits):
-            return run.result(tree.size, limit)
-        known_cost, *_, node = heappop(frontier)
-        updated = entry(node)
-        if updated[0] > known_cost:  # its state has been visited since
-            heappush(frontier, updated)
+        if limit := tree.limit_reached():
+            return tree.result(limit)
+        known_rank, _, node = heappop(frontier)
+        if estimate.rank(node) > known_rank:  # it has grown since
+            heappush(frontier, entry(node))
             continue
         configuration = tree.configuration(node)
         if configuration is None:
             continue
         if tree.satisfied(node):
-            if run.solve(node.skeleton):
-                return run.result(tree.size)
-        elif len(node.skeleton) < limits.max_depth:
-            visits[node.state] += 1
+            if tree.run.solve(node.skeleton):
+                return tree.result()
+        elif len(node.skeleton) < max_depth:
+            estimate.expanded(node)
             for child in tree.expand(node, configuration):
-                heappush(frontier, entry(child))
-    return run.result(tree.size, "exhausted")
+                if estimate.least_length(child) <= max_depth:
+                    heappush(frontier, entry(child))
+    return tree.result("exhausted")

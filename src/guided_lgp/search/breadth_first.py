@@ -1,31 +1,22 @@
 """Breadth-first LGP: the baseline (paper, Sec. III-B, "original work")."""
 
-from guided_lgp.logic import Objective, Symbols, validate_objective
-from guided_lgp.params import SearchLimits
-from guided_lgp.scene import Scene
-from guided_lgp.search.bounds import Bounds
+from guided_lgp.search.problem import Problem
 from guided_lgp.search.result import Run, SearchResult
 from guided_lgp.search.tree import GoalStates, LogicTree
 
 
-def plan(
-    scene: Scene, objective: Objective, symbols: Symbols, bounds: Bounds, limits: SearchLimits
-) -> SearchResult:
+def plan(problem: Problem) -> SearchResult:
     """Expand the logic tree in order until a sequence that satisfies the objective is feasible.
 
     Equal states are not merged, and an infeasible sequence is expanded like any other: this is
     the plain tree of the original LGP. It has no maximum depth.
-
-    Raises:
-        InputError: the objective is contradictory, unknown or already satisfied.
     """
-    validate_objective(objective, symbols, scene.state)
-    run = Run(bounds)
-    tree = LogicTree(symbols, scene.state)
-    goals = GoalStates(tree.space, objective)
+    run = Run(problem)
+    tree = LogicTree(problem.symbols, problem.scene.state)
+    goals = GoalStates(tree.space, problem.objective)
     node = 0
     while node < len(tree):
-        if limit := run.limit_reached(len(tree), limits):
+        if limit := run.limit_reached(len(tree)):
             return run.result(len(tree), limit)
         run.expansions += 1
         for child in tree.expand(node):

@@ -2,17 +2,13 @@
 
 from collections.abc import Iterator
 
-from guided_lgp.logic import Objective, Skeleton, Symbols, validate_objective
-from guided_lgp.params import SearchLimits
-from guided_lgp.scene import Scene
-from guided_lgp.search.bounds import Bounds
+from guided_lgp.logic import Objective, Skeleton
+from guided_lgp.search.problem import Problem
 from guided_lgp.search.result import Run, SearchResult
 from guided_lgp.search.tree import GoalStates, StateSpace, distances
 
 
-def plan(
-    scene: Scene, objective: Objective, symbols: Symbols, bounds: Bounds, limits: SearchLimits
-) -> SearchResult:
+def plan(problem: Problem) -> SearchResult:
     """Breadth-first over distinct states, then all sequences through them in order of length.
 
     The first sequence may be geometrically infeasible, so the graph is kept with all its
@@ -20,22 +16,20 @@ def plan(
     the first time at their end. What begins with an infeasible sequence is left out. Ends at
     ``limits.max_depth`` or ``limits.max_tree_size``; the tree size is the number of distinct states
     plus that of the nodes of the sequences read off.
-
-    Raises:
-        InputError: the objective is contradictory, unknown or already satisfied.
     """
-    validate_objective(objective, symbols, scene.state)
-    run = Run(bounds)
-    graph = _Graph(StateSpace(symbols, scene.state), objective, limits.max_tree_size)
+    run = Run(problem)
+    limits = problem.limits
+    space = StateSpace(problem.symbols, problem.scene.state)
+    graph = _Graph(space, problem.objective, limits.max_tree_size)
     for length in range(1, limits.max_depth + 1):
         run.expansions += graph.expand_layer()
         for skeleton in graph.sequences(length):
             if run.solve(skeleton):
                 return run.result(graph.size)
-            if limit := run.limit_reached(graph.size, limits):
+            if limit := run.limit_reached(graph.size):
                 return run.result(graph.size, limit)
             graph.excluded.add(run.failed)
-        if limit := run.limit_reached(graph.size, limits):
+        if limit := run.limit_reached(graph.size):
             return run.result(graph.size, limit)
     return run.result(graph.size, "exhausted")
 

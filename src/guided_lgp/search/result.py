@@ -7,9 +7,7 @@ from typing import Literal
 
 from guided_lgp.bounds.results import Array, CoarseResult, Failure, PathResult
 from guided_lgp.logic import Action, Objective, Skeleton, State, format_skeleton
-from guided_lgp.params import SearchLimits
-from guided_lgp.search.bounds import Bounds
-from guided_lgp.search.policy import Policy
+from guided_lgp.search.problem import Problem
 
 Cause = Literal["infeasible", "max_depth"]
 """Why an attempt of the guided search ended (paper, Table I)."""
@@ -93,9 +91,10 @@ class SearchResult:
 class Run:
     """One run of a planner: the bounds and the policy as it sees them, with their cost."""
 
-    def __init__(self, bounds: Bounds, policy: Policy | None = None) -> None:
-        self._bounds = bounds
-        self._policy = policy
+    def __init__(self, problem: Problem) -> None:
+        self._bounds = problem.bounds
+        self._policy = problem.policy
+        self._limits = problem.limits
         self._start = time.perf_counter()
         self._waited = 0.0
         self._policy_s = self._coarse_s = self._path_s = 0.0
@@ -164,8 +163,9 @@ class Run:
         self._policy_calls += 1
         return scores
 
-    def limit_reached(self, tree_size: int, limits: SearchLimits) -> Reason | None:
+    def limit_reached(self, tree_size: int) -> Reason | None:
         """The limit that ends the search, if one is reached."""
+        limits = self._limits
         if self._path_calls >= limits.max_paths:
             return "paths"
         if len(self._asked) >= limits.max_sequences:

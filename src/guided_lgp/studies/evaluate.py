@@ -5,9 +5,8 @@ has one counts as a plan, the path bound is not asked. A verdict is computed onc
 and shared by all policies.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -30,17 +29,15 @@ from guided_lgp.paths import SCENES, SEQUENCES
 from guided_lgp.policy.registry import load_policy
 from guided_lgp.policy.split import training_objectives
 from guided_lgp.scene import Scene, load_scenes
-from guided_lgp.search import best_first, guided
+from guided_lgp.search.planners import TABLE_1
+from guided_lgp.search.problem import Problem
 from guided_lgp.search.result import SearchResult
 from guided_lgp.studies.cases import OUTCOMES, RESULTS, TRAINED, StudyParams, load_study
 
 Row = dict[str, Any]
 
-PLANNERS: Mapping[str, Callable[..., SearchResult]] = {
-    "default": partial(guided.plan, adapt=False),
-    "adaptation": guided.plan,
-    "best_first": best_first.plan,
-}
+PLANNERS = {key: planner for key, planner in TABLE_1.items() if planner.policy == "paper"}
+"""The searches of Table I, by their keys there; each study brings its own policies."""
 
 
 class CoarseBounds:
@@ -139,8 +136,9 @@ def _evaluate(task: _Evaluation) -> list[Row]:
         policy = load_policy(kind, task.root / TRAINED / name / str(seed))
         seen = set(training_objectives(symbols, case.drawn_objectives(task.params), seed))
         for objective in problems(task.scene):
-            result = PLANNERS[planner](
-                task.scene, objective, symbols, bounds, policy, task.study.limits
+            search = PLANNERS[planner]
+            result = search.plan(
+                Problem(task.scene, objective, task.study.limits, bounds, policy, search.adapt)
             )
             rows.append(
                 {

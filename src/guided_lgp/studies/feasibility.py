@@ -24,6 +24,7 @@ from guided_lgp.paths import SCENES, SEQUENCES, TRAINED
 from guided_lgp.policy.registry import POLICIES, load_policy
 from guided_lgp.scene import Scene, load_scenes
 from guided_lgp.search.observation import observe, start
+from guided_lgp.search.problem import Problem
 from guided_lgp.studies.cases import CLASSIFIER, OUTCOMES, RESULTS, load_study
 from guided_lgp.studies.classifier import (
     FeasibilityAware,
@@ -168,8 +169,8 @@ def evaluate(task: _Task) -> list[Row]:
             for search in SEARCHES:
                 for objective in problems(task.scene):
                     bounds.asked = {}
-                    result = PLANNERS[search](
-                        task.scene, objective, task.scene.symbols, bounds, scorer, task.limits
+                    result = PLANNERS[search].plan(
+                        Problem(task.scene, objective, task.limits, bounds, scorer)
                     )
                     infeasible = [
                         verdict for verdict in bounds.asked.values() if not verdict.feasible

@@ -5,35 +5,40 @@ from pathlib import Path
 
 import casadi as ca
 
-from guided_lgp.bounds.coarse.kernels import kernels, reach
+from guided_lgp.bounds.program.kinematics import kinematics_of
+from guided_lgp.bounds.terms import kernel_table
+from guided_lgp.bounds.terms.hold import reach_function
 from guided_lgp.compiled import load_compiled
+from guided_lgp.robots import Robot
 
 
-def _source() -> str:
-    """The kernels' C code, their table, and the loop."""
+def _source(robot: Robot) -> str:
+    """The C code of a robot's kernels, their table, and the loop."""
+    kinematics = kinematics_of(robot)
+    table, reach = kernel_table(kinematics), reach_function(kinematics)
     generator = ca.CodeGenerator("kernels", {"casadi_int": "int", "with_header": False})
-    functions = [f for kernel in kernels() for f in (kernel.residual, kernel.jacobian)]
-    for function in (*functions, reach()):
+    functions = [f for kernel in table for f in (kernel.residual, kernel.jacobian)]
+    for function in (*functions, reach):
         generator.add(function)
     entries = ", ".join(
         f"{{{k.name}_residual, {k.name}_jacobian, {k.inputs}, {k.rows}, {int(k.equality)}}}"
-        for k in kernels()
+        for k in table
     )
     macros = {
         "KERNELS": entries,
-        "LARGEST_INPUT": max(kernel.inputs for kernel in kernels()),
-        "LARGEST_ROWS": max(kernel.rows for kernel in kernels()),
-        "WORK": max(1, *(function.sz_w() for function in (*functions, reach()))),
+        "LARGEST_INPUT": max(kernel.inputs for kernel in table),
+        "LARGEST_ROWS": max(kernel.rows for kernel in table),
+        "WORK": max(1, *(function.sz_w() for function in (*functions, reach))),
     }
     loop = Path(__file__).with_name("solver.c").read_text(encoding="utf-8")
     defines = "\n".join(f"#define {name} {value}" for name, value in macros.items())
     return f"{generator.dump()}\n{defines}\n{loop}"
 
 
-def load_library() -> ctypes.CDLL | None:
-    """The compiled solver, or None if it is not there and no compiler works.
+def load_library(robot: Robot) -> ctypes.CDLL | None:
+    """The compiled solver of a robot's kernels, or None if it is not there and no compiler works.
 
     Raises:
         InputError: the cache folder cannot be written.
     """
-    return load_compiled("coarse", _source())
+    return load_compiled("coarse", _source(robot))

@@ -5,9 +5,12 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from guided_lgp.bounds.coarse.kernels import kernels
-from guided_lgp.bounds.coarse.solver import Interpreter, Program, Settings, Solution
+from guided_lgp.bounds.coarse.solver import Interpreter, Settings, Solution, equalities
+from guided_lgp.bounds.program.arrays import Program
+from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.bounds.results import Array
+from guided_lgp.bounds.terms import kernel_table
+from guided_lgp.robots import Robot
 
 
 class Ipopt:
@@ -17,17 +20,19 @@ class Ipopt:
     nothing is shared between programs.
     """
 
-    def __init__(self, program: Program, values: Array, settings: Settings) -> None:
+    def __init__(self, robot: Robot, program: Program, values: Array, settings: Settings) -> None:
         """Set up a program; ``values`` gives the constants (variables first, then constants)."""
         self._program = program
         self._settings = settings
+        self._interpreter = Interpreter(robot)
+        self._table = kernel_table(kinematics_of(robot))
         count = program.variables
         self._constants = values[count:]
         x = ca.SX.sym("x", count)
         everything = ca.vertcat(x, ca.SX(self._constants))
         rows, lower, upper = [], [], []
         for i, number in enumerate(program.kernel):
-            kernel = kernels()[number]
+            kernel = self._table[number]
             inputs = program.inputs[program.input_start[i] :][: kernel.inputs].tolist()
             parameters = program.parameters[program.parameter_start[i] :][: kernel.parameters]
             c = kernel.independent(everything[inputs], ca.SX(parameters))
@@ -66,9 +71,7 @@ class Ipopt:
             ubg=self._upper,
         )
         everything = np.concatenate([np.array(answer["x"]).ravel(), self._constants])
-        c = Interpreter().residuals(program, everything)
-        equality = np.concatenate(
-            [np.full(kernels()[k].rows, kernels()[k].equality) for k in program.kernel]
-        )
+        c = self._interpreter.residuals(program, everything)
+        equality = equalities(self._table, program)
         worst = float(np.max(np.where(equality, np.abs(c), -c - self._settings.slack), initial=0.0))
         return Solution(everything, c, worst, int(self._solver.stats()["iter_count"]))

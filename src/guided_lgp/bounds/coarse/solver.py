@@ -4,57 +4,21 @@ import ctypes
 import logging
 from dataclasses import astuple, dataclass, fields
 from functools import cache
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from guided_lgp.bounds.coarse.compiler import load_library
-from guided_lgp.bounds.coarse.kernels import kernels, reach
+from guided_lgp.bounds.program.arrays import Program
+from guided_lgp.bounds.program.kernels import Kernel, KernelTable
+from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.bounds.results import Array
-
-Integers = NDArray[np.intc]
+from guided_lgp.bounds.terms import kernel_table
+from guided_lgp.bounds.terms.hold import reach_function
+from guided_lgp.robots import Robot
 
 _log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True)
-class Program:
-    """min 1/2 sum w (x - t)^2 over lower <= x <= upper, subject to the rows of kernel instances.
-
-    Instance i is kernel ``kernel[i]`` of the values at ``inputs[input_start[i]:...]`` (indices
-    below the number of variables are variables, the others constants) with the parameters that
-    start at ``parameters[parameter_start[i]]``; its rows start at ``row_start[i]``, and
-    ``row_start`` has one entry more, the number of rows. ``order[v]`` is the place of a variable
-    in the factorisation. The fields are those of the structure in C, in its order.
-    """
-
-    kernel: Integers
-    input_start: Integers
-    inputs: Integers
-    parameter_start: Integers
-    row_start: Integers
-    parameters: Array
-    weight: Array
-    target: Array
-    lower: Array
-    upper: Array
-    order: Integers
-
-    @property
-    def variables(self) -> int:
-        """Number of variables."""
-        return len(self.weight)
-
-    @property
-    def instances(self) -> int:
-        """Number of kernel instances."""
-        return len(self.kernel)
-
-    @property
-    def rows(self) -> int:
-        """Number of constraints."""
-        return int(self.row_start[-1])
 
 
 @dataclass(frozen=True)
@@ -100,7 +64,8 @@ class Solver(Protocol):
         ...
 
     def reach(self, arguments: Array) -> Array:
-        """Inverse kinematics: (count, 15) to (count, 8), see :func:`kernels.reach`."""
+        """Inverse kinematics: (count, 15) to (count, 8), see
+        :func:`guided_lgp.bounds.terms.hold.reach_function`."""
         ...
 
 
@@ -162,13 +127,15 @@ class Compiled:
 class Interpreter:
     """The same loop in numpy, with the kernels on CasADi's virtual machine."""
 
+    def __init__(self, robot: Robot) -> None:
+        self._robot = kinematics_of(robot)
+        self._table = kernel_table(self._robot)
+
     def solve(self, program: Program, values: Array, settings: Settings) -> Solution:
         """See :class:`Solver`."""
         n = program.variables
         values = np.array(values, dtype=np.float64)
-        equality = np.concatenate(
-            [np.full(kernels()[k].rows, kernels()[k].equality) for k in program.kernel]
-        )
+        equality = equalities(self._table, program)
         penalty, damping, tried = settings.penalty, settings.damping, 0
         multiplier = np.zeros(program.rows)
         c = self.residuals(program, values)
@@ -217,11 +184,11 @@ class Interpreter:
 
     def reach(self, arguments: Array) -> Array:
         """See :class:`Solver`."""
-        solutions = reach().map(len(arguments))(np.asarray(arguments).T)
+        solutions = reach_function(self._robot).map(len(arguments))(np.asarray(arguments).T)
         return np.array(solutions).T
 
-    def _arguments(self, program: Program, i: int, values: Array) -> tuple[Any, Array, Array]:
-        kernel = kernels()[program.kernel[i]]
+    def _arguments(self, program: Program, i: int, values: Array) -> tuple[Kernel, Array, Array]:
+        kernel = self._table[program.kernel[i]]
         inputs = program.inputs[program.input_start[i] :][: kernel.inputs]
         parameters = program.parameters[program.parameter_start[i] :][: kernel.parameters]
         return kernel, values[inputs], parameters
@@ -264,6 +231,11 @@ class Interpreter:
         return g, H
 
 
+def equalities(table: KernelTable, program: Program) -> NDArray[np.bool_]:
+    """Which rows (rows,) are equalities."""
+    return np.concatenate([np.full(table[k].rows, table[k].equality) for k in program.kernel])
+
+
 def _violation(c: Array, equality: NDArray[np.bool_], slack: float) -> float:
     return float(np.max(np.where(equality, np.abs(c), -c - slack), initial=0.0))
 
@@ -283,13 +255,13 @@ def _merit(
 
 
 @cache
-def default_solver() -> Solver:
+def default_solver(robot: Robot) -> Solver:
     """The compiled solver, or the interpreted one where there is no C compiler (said once)."""
-    library = load_library()
+    library = load_library(robot)
     if library is not None:
         return Compiled(library)
     _log.warning(
         "no C compiler found (cc, gcc, clang or the package ziglang): the coarse bound runs "
         "on CasADi's virtual machine, with the same verdicts, about a hundred times slower"
     )
-    return Interpreter()
+    return Interpreter(robot)

@@ -28,12 +28,13 @@ import casadi as ca
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from guided_lgp.bounds.coarse.kinematics import arm_pose
 from guided_lgp.bounds.path.ik import REACH, Arm
 from guided_lgp.bounds.path.motions import Motion, Mover, Transit
 from guided_lgp.bounds.path.situation import Step
 from guided_lgp.bounds.path.spaces import STEP
+from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.bounds.results import Array
+from guided_lgp.robots import load_robot
 from guided_lgp.scene.pr2 import JOINT_LIMITS, VELOCITY_LIMITS, arm_slice
 
 WAYPOINTS = 10
@@ -271,7 +272,8 @@ def quadratic_program() -> Any:
     smoothness = ca.sumsqr(bends) + leaves * ca.sumsqr(first) + enters * ca.sumsqr(final)
     cost = ca.sumsqr(steps) / h + _TAU**2 * smoothness / h**3 + _SLACK_WEIGHT * ca.sumsqr(slack)
     angles = ca.SX.sym("angles", 7)
-    up = arm_pose(angles, 1, 0).rotation[2, :].T
+    (chain,) = kinematics_of(load_robot("pr2")).chains
+    up = chain.pose(angles, 1, (0,)).rotation[2, :].T
     tilt = ca.Function("tilt", [angles], [up, ca.jacobian(up, angles)])
     for i in range(WAYPOINTS):
         now, change = tilt(last[:, i + 1])

@@ -1,0 +1,83 @@
+"""From values of a program back to keyframes in the world, and to the constraint that fails."""
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from guided_lgp.bounds.coarse.formulation import Formulation
+from guided_lgp.bounds.coarse.solver import Solution
+from guided_lgp.bounds.program.draft import pose_values
+from guided_lgp.bounds.program.geometry import SceneGeometry
+from guided_lgp.bounds.program.kernels import SCALE, KernelTable
+from guided_lgp.bounds.program.kinematics import kinematics_of
+from guided_lgp.bounds.program.slots import HeldBox, KeyframeSlots, PlanarPose
+from guided_lgp.bounds.results import Array, Failure, Keyframe
+from guided_lgp.bounds.terms import kernel_table
+from guided_lgp.bounds.terms.hold import in_tool
+from guided_lgp.poses import compose
+
+
+class Decoder:
+    """Reads solutions of the programs of one scene."""
+
+    def __init__(self, geometry: SceneGeometry) -> None:
+        placed = geometry.scene.robot
+        self._geometry = geometry
+        self._robot = placed.description
+        self._arms = kinematics_of(self._robot).arms
+        self._table = kernel_table(kinematics_of(self._robot))
+        self._tools = {
+            gripper: placed.tool_pose(self._robot.home, gripper) for gripper in self._robot.grippers
+        }
+
+    def keyframes(
+        self, formulation: Formulation, keyframes: Iterable[KeyframeSlots], values: Array
+    ) -> tuple[Keyframe, ...]:
+        """Arms and boxes in the world at keyframes of the program."""
+        poses: dict[int, Array] = {}
+        frames = []
+        for slots in keyframes:
+            boxes = {}
+            for name, where in slots.boxes.items():
+                if id(where) not in poses:  # most boxes stand where they stood before
+                    poses[id(where)] = self._box_pose(formulation, where, values)
+                boxes[name] = poses[id(where)]
+            frames.append(Keyframe(self._configuration(slots, values), boxes))
+        return tuple(frames)
+
+    def _configuration(self, slots: KeyframeSlots, values: Array) -> Array:
+        q = self._robot.home.copy()
+        for gripper, joints in slots.joints.items():
+            if joints is not None:
+                arm = self._robot.arms[gripper]
+                q[arm.slice] = arm.signs * values[list(joints)]
+        return q
+
+    def _box_pose(
+        self, formulation: Formulation, where: PlanarPose | HeldBox, values: Array
+    ) -> Array:
+        if isinstance(where, HeldBox):
+            chain = self._arms[where.gripper].chain
+            return compose(self._tools[where.gripper], in_tool(where, values, chain))
+        pose = pose_values(values, formulation.program.variables, where)
+        return self._geometry.in_world(*pose)
+
+    def failure(self, formulation: Formulation, solution: Solution, slack: float) -> Failure:
+        """The constraint that is violated most."""
+        starts = formulation.program.row_start
+        excess, index, row = -np.inf, 0, 0
+        for i, instance in enumerate(formulation.instances):
+            values = solution.residuals[starts[i] : starts[i + 1]]
+            amounts = _amounts(self._table, instance.kernel, values, slack)
+            highest = int(np.argmax(amounts))
+            if amounts[highest] > excess:
+                excess, index, row = float(amounts[highest]), i, highest
+        instance = formulation.instances[index]
+        amount = abs(float(solution.residuals[starts[index] + row]))
+        scale = SCALE if row < self._table[instance.kernel].lengths else 1.0
+        return Failure(instance.action, instance.name(row), amount / scale, "solver")
+
+
+def _amounts(table: KernelTable, number: int, values: Array, slack: float) -> Array:
+    """By how much the rows of a kernel are violated (scaled)."""
+    return np.abs(values) if table[number].equality else -values - slack

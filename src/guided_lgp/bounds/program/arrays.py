@@ -1,0 +1,154 @@
+"""The nonlinear program in arrays, and what builds it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from guided_lgp.bounds.program.kernels import KernelTable
+from guided_lgp.bounds.results import Array
+
+Integers = NDArray[np.intc]
+
+
+@dataclass(frozen=True)
+class Program:
+    """min 1/2 sum w (x - t)^2 over lower <= x <= upper, subject to the rows of kernel instances.
+
+    Instance i is kernel ``kernel[i]`` of the values at ``inputs[input_start[i]:...]`` (indices
+    below the number of variables are variables, the others constants) with the parameters that
+    start at ``parameters[parameter_start[i]]``; its rows start at ``row_start[i]``, and
+    ``row_start`` has one entry more, the number of rows. ``order[v]`` is the place of a variable
+    in the factorisation. The fields are those of the structure in C, in its order.
+    """
+
+    kernel: Integers
+    input_start: Integers
+    inputs: Integers
+    parameter_start: Integers
+    row_start: Integers
+    parameters: Array
+    weight: Array
+    target: Array
+    lower: Array
+    upper: Array
+    order: Integers
+
+    @property
+    def variables(self) -> int:
+        """Number of variables."""
+        return len(self.weight)
+
+    @property
+    def instances(self) -> int:
+        """Number of kernel instances."""
+        return len(self.kernel)
+
+    @property
+    def rows(self) -> int:
+        """Number of constraints."""
+        return int(self.row_start[-1])
+
+
+@dataclass(frozen=True)
+class Instance:
+    """What a kernel instance means: its constraint's name and symbols, and the action's index."""
+
+    action: int
+    kernel: int
+    names: tuple[str, ...]
+    links: tuple[str, ...] = ()
+    """The link that each row is about, where rows are about links; it stands for the gripper."""
+
+    def name(self, row: int) -> str:
+        """Of the constraint in one of its rows."""
+        if not self.links:
+            return " ".join(self.names)
+        return " ".join((self.names[0], self.links[row], *self.names[2:]))
+
+
+class ProgramBuilder:
+    """Collects variables, constants and kernel instances."""
+
+    def __init__(self, table: KernelTable) -> None:
+        self._table = table
+        self.constants: list[float] = [0.0]
+        self.instances: list[Instance] = []
+        self._lower: list[float] = []
+        self._upper: list[float] = []
+        self._weight: list[float] = []
+        self._target: list[float] = []
+        self._shared: list[bool] = []
+        self._kernel: list[int] = []
+        self._inputs: list[int] = []
+        self._parameters: list[float] = []
+
+    def constant(self, value: float) -> int:
+        """The slot of a new constant."""
+        self.constants.append(value)
+        return -len(self.constants)
+
+    def variable(
+        self, lower: float, upper: float, weight: float, target: float, shared: bool = True
+    ) -> int:
+        """The slot of a new variable.
+
+        Args:
+            lower: bound.
+            upper: bound.
+            weight: of the squared distance from the target.
+            target: where the variable is drawn to.
+            shared: whether rows of several configurations meet in it; the others are eliminated
+                first, which keeps the factorisation sparse.
+        """
+        self._lower.append(lower)
+        self._upper.append(upper)
+        self._weight.append(weight)
+        self._target.append(target)
+        self._shared.append(shared)
+        return len(self._lower) - 1
+
+    def rows(
+        self,
+        kernel: str,
+        inputs: Sequence[int],
+        parameters: Sequence[float],
+        action: int,
+        names: tuple[str, ...],
+        links: tuple[str, ...] = (),
+    ) -> None:
+        """Add an instance of a kernel; see :class:`Instance`."""
+        number = self._table.number[kernel]
+        self._kernel.append(number)
+        self._inputs.extend(inputs)
+        self._parameters.extend(parameters)
+        self.instances.append(Instance(action, number, names, links))
+
+    def build(self) -> Program:
+        """The program."""
+        count = len(self._lower)
+        sizes = np.array([[k.inputs, k.parameters, k.rows] for k in self._table])
+        starts = np.zeros((len(self._kernel) + 1, 3), dtype=np.intc)
+        np.cumsum(sizes[self._kernel], axis=0, out=starts[1:])
+        inputs = np.array(self._inputs, dtype=np.intc)
+        inputs = np.where(inputs < 0, count - 1 - inputs, inputs).astype(np.intc)
+        order = np.empty(count, dtype=np.intc)
+        order[np.argsort(self._shared, kind="stable")] = np.arange(count)
+        return Program(
+            kernel=np.array(self._kernel, dtype=np.intc),
+            input_start=_column(starts, 0),
+            inputs=inputs,
+            parameter_start=_column(starts, 1),
+            row_start=_column(starts, 2),
+            parameters=np.array(self._parameters),
+            weight=np.array(self._weight),
+            target=np.array(self._target),
+            lower=np.array(self._lower),
+            upper=np.array(self._upper),
+            order=order,
+        )
+
+
+def _column(starts: Integers, column: int) -> Integers:
+    return np.ascontiguousarray(starts[:, column])

@@ -1,0 +1,77 @@
+"""A start in the making: values that are kept from before, and values that terms choose."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from guided_lgp.bounds.program.kinematics import RobotKinematics
+from guided_lgp.bounds.program.slots import PlanarPose
+from guided_lgp.bounds.results import Array
+
+Reach = Callable[[Array], Array]
+"""Inverse kinematics of the whole grid at once, see :func:`guided_lgp.bounds.terms.hold.reach`."""
+
+
+class Draft:
+    """One start in the making."""
+
+    def __init__(
+        self,
+        values: Array,
+        variables: int,
+        lower: Array,
+        kept: int,
+        generator: np.random.Generator,
+        noise: float,
+        robot: RobotKinematics,
+        fixed: Sequence[float],
+        reach: Reach,
+    ) -> None:
+        """Begin a start.
+
+        Args:
+            values: of the variables, then the constants; filled in place.
+            variables: their number.
+            lower: bounds of the variables.
+            kept: how many values, the first ones, are known and stay.
+            generator: for placements and choices.
+            noise: how far from the best candidates a choice may be (0: the best ones).
+            robot: whose arms these are.
+            fixed: values of the joints that the scene sets.
+            reach: inverse kinematics.
+        """
+        self.values = values
+        self.lower = lower
+        self.kept = kept
+        self.generator = generator
+        self.noise = noise
+        self.robot = robot
+        self.fixed = tuple(fixed)
+        self.reach = reach
+        self._variables = variables
+
+    def pose(self, pose: PlanarPose) -> Array:
+        """x, y, yaw and z of a level body."""
+        return np.array(pose_values(self.values, self._variables, pose))
+
+    def choose(self, costs: Array) -> int:
+        """The index of the least cost, or of another low one."""
+        if self.noise:
+            costs = costs + self.noise * self.generator.exponential(1.0, costs.shape)
+        return int(np.argmin(costs))
+
+
+def pose_values(
+    values: Array, variables: int, pose: PlanarPose
+) -> tuple[float, float, float, float]:
+    """x, y, yaw and z of a level body.
+
+    Args:
+        values: of the variables, then the constants.
+        variables: their number.
+        pose: slots.
+    """
+    x, y, yaw, z = (
+        float(values[slot if slot >= 0 else variables - 1 - slot]) for slot in (*pose.plane, pose.z)
+    )
+    return x, y, yaw, z + pose.offset

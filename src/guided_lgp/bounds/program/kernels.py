@@ -1,0 +1,107 @@
+"""Kernels: the symbolic form of one kind of constraint, with its derivatives.
+
+A program is a list of instances: a kernel, where in the vector of values its arguments stand, and
+its parameters. Nothing is built per skeleton, so that the kernels can be compiled once per robot.
+
+Poses of boxes are level, ``(x, y, yaw, z)`` in the robot's frame (m, rad), ``z`` the height of the
+centre before an offset. All residuals are multiplied by ``SCALE`` where they are lengths, so that
+one tolerance serves all. Equalities are ``c = 0``, inequalities ``c >= 0``.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+SCALE = 5.0
+"""Weight of a residual in m against one in rad."""
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """One kind of constraint.
+
+    ``residual`` and ``jacobian`` are CasADi functions of (x, p): arguments (inputs,) and
+    parameters (parameters,) to c (rows,) and to c and its dense Jacobian (rows, inputs).
+    """
+
+    name: str
+    equality: bool
+    inputs: int
+    parameters: int
+    rows: int
+    lengths: int
+    """How many rows, the first ones, are lengths; the others are in rad."""
+    residual: Any
+    jacobian: Any
+    independent: Any
+    """Like ``residual``, with no more rows than independent constraints, for other solvers."""
+
+
+def kernel(
+    name: str,
+    x: Any,
+    p: Any,
+    c: Any,
+    equality: bool = False,
+    lengths: int | None = None,
+    independent: Any = None,
+) -> Kernel:
+    """The kernel of a symbolic residual.
+
+    Args:
+        name: of the constraint, and of the kinematics that it is about.
+        x: symbols of the arguments.
+        p: symbols of the parameters.
+        c: expression of the rows, scaled.
+        equality: whether the rows vanish; otherwise none is negative.
+        lengths: how many rows, the first ones, are lengths; all by default.
+        independent: of the rows, an equivalent without dependent ones.
+    """
+    jacobian = ca.densify(ca.jacobian(c, x))
+    return Kernel(
+        name=name,
+        equality=equality,
+        inputs=x.numel(),
+        parameters=p.numel(),
+        rows=c.numel(),
+        lengths=c.numel() if lengths is None else lengths,
+        residual=ca.Function(f"{name}_residual", [x, p], [ca.densify(c)]),
+        # transposed: CasADi stores columns, the solver reads rows
+        jacobian=ca.Function(f"{name}_jacobian", [x, p], [ca.densify(c), jacobian.T]),
+        independent=ca.Function(
+            f"{name}_independent", [x, p], [c if independent is None else independent]
+        ),
+    )
+
+
+def absolute(value: Any) -> Any:
+    """Absolute value, smooth at zero."""
+    return ca.sqrt(value**2 + 1e-8)
+
+
+def distance(vector: Any) -> Any:
+    """Length of a vector, with a derivative at zero."""
+    return ca.sqrt(ca.sumsqr(vector) + 1e-12)
+
+
+def in_frame(yaw: Any, vector: Any) -> tuple[Any, Any]:
+    """The horizontal part of a vector in a frame turned by ``yaw``."""
+    cosine, sine = ca.cos(yaw), ca.sin(yaw)
+    return cosine * vector[0] + sine * vector[1], -sine * vector[0] + cosine * vector[1]
+
+
+class KernelTable:
+    """The kernels of one robot; their numbers are those in the solver."""
+
+    def __init__(self, kernels: Sequence[Kernel]) -> None:
+        self.kernels = tuple(kernels)
+        self.number = {kernel.name: index for index, kernel in enumerate(self.kernels)}
+        """By the kernel's name."""
+
+    def __getitem__(self, number: int) -> Kernel:
+        return self.kernels[number]
+
+    def __iter__(self) -> Any:
+        return iter(self.kernels)

@@ -1,0 +1,172 @@
+"""Kinematics of arms in CasADi: a robot's chains as kernels need them.
+
+A chain is read from the robot's description in the frame of the robot's base link. An arm that is
+the mirror image of another shares its chain: mirrored joint values go in, and ``side`` = -1 turns
+the result over at the plane y = 0.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from guided_lgp.bounds.results import Array
+from guided_lgp.poses import rotation_matrix
+from guided_lgp.robots import Arm, Robot
+from guided_lgp.robots.chain import Joint, path_between, read_joints
+from guided_lgp.robots.robot import Sphere
+
+
+@dataclass(frozen=True)
+class ArmPose:
+    """Where the tool and the spheres of an arm are, as CasADi expressions in the robot's frame."""
+
+    position: Any
+    """(3,) m."""
+    rotation: Any
+    """(3, 3); columns are the tool's axes."""
+    spheres: Any
+    """(3, number of spheres) m: centres."""
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """The joints from the robot's base link to a tool frame, and what is fixed to them."""
+
+    name: str
+    """Of the gripper at its end."""
+    joints: tuple[Joint, ...]
+    tool: tuple[Array, Array]
+    """Rotation (3, 3) and position (3,) of the tool frame in the last link."""
+    moving: tuple[str, ...]
+    """The joints whose values are the arm's."""
+    fixed: tuple[str, ...]
+    """The joints that the scene sets, of the whole robot."""
+    spheres: tuple[Sphere, ...]
+    against_arms: tuple[int, ...]
+    """The spheres that stand for the arm against another."""
+    palm_front: float
+    """x of the palm's front in the tool frame (m)."""
+
+    def pose(self, q: Any, side: Any, fixed: Any) -> ArmPose:
+        """Forward kinematics.
+
+        Args:
+            q: values of the moving joints (rad), mirrored for a mirror image.
+            side: 1, or -1 for the mirror image.
+            fixed: values of the joints that the scene sets (rad, m).
+        """
+        value = {name: q[i] for i, name in enumerate(self.moving)}
+        value |= {name: fixed[i] for i, name in enumerate(self.fixed)}
+        rotation, position = ca.SX.eye(3), ca.SX.zeros(3)
+        centres: dict[int, Any] = {}
+        for joint in self.joints:
+            position = position + ca.mtimes(rotation, _exact(joint.position))
+            rotation = ca.mtimes(rotation, _exact(joint.rotation))
+            if joint.name in value and joint.kind == "prismatic":
+                position = position + ca.mtimes(rotation, _exact(joint.axis)) * value[joint.name]
+            elif joint.name in value:
+                rotation = ca.mtimes(rotation, turned(joint.axis, value[joint.name]))
+            for i, sphere in enumerate(self.spheres):
+                if sphere.link == joint.child:
+                    centres[i] = position + ca.mtimes(rotation, _exact(np.array(sphere.centre)))
+        position = position + ca.mtimes(rotation, _exact(self.tool[1]))
+        rotation = ca.mtimes(rotation, _exact(self.tool[0]))
+        mirror = ca.diag(ca.vertcat(1, side, 1))
+        spheres = ca.horzcat(*(centres[i] for i in range(len(self.spheres))))
+        return ArmPose(
+            position=ca.mtimes(mirror, position),
+            rotation=ca.mtimes([mirror, rotation, mirror]),
+            spheres=ca.mtimes(mirror, spheres),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class ArmKinematics:
+    """An arm as the program sees it: in the convention of its chain."""
+
+    arm: Arm
+    chain: Chain
+    side: float
+    """1, or -1 for the mirror image of the chain."""
+    home: tuple[float, ...]
+    """Posture at its side (rad), in the chain's convention."""
+    limits: tuple[tuple[float, float], ...]
+    """rad, in the chain's convention."""
+    links: tuple[str, ...]
+    """The link of each sphere."""
+
+
+@dataclass(frozen=True, eq=False)
+class RobotKinematics:
+    """All arms of a robot, and the chains that they share."""
+
+    robot: Robot
+    arms: dict[str, ArmKinematics]
+    """By gripper."""
+    fixed: tuple[str, ...]
+    """The joints that the scene sets."""
+
+    @property
+    def chains(self) -> tuple[Chain, ...]:
+        """The different ones."""
+        return tuple(dict.fromkeys(arm.chain for arm in self.arms.values()))
+
+
+@cache
+def kinematics_of(robot: Robot) -> RobotKinematics:
+    """A robot's arms in CasADi."""
+    fixed = tuple(joint.joint for joint in robot.fixed_joints.values())
+    joints = read_joints(robot.urdf)
+    chains = {
+        gripper: _chain(robot, arm, fixed, joints)
+        for gripper, arm in robot.arms.items()
+        if arm.mirror_of is None
+    }
+    arms = {}
+    for gripper, arm in robot.arms.items():
+        original = robot.arms[arm.mirror_of or gripper]
+        arms[gripper] = ArmKinematics(
+            arm=arm,
+            chain=chains[original.gripper],
+            side=1.0 if arm.mirror_of is None else -1.0,
+            home=tuple((arm.signs * arm.home).tolist()),
+            limits=tuple((low, high) for low, high in original.limits.tolist()),
+            links=tuple(sphere.link for sphere in arm.spheres),
+        )
+    return RobotKinematics(robot, arms, fixed)
+
+
+def _chain(robot: Robot, arm: Arm, fixed: tuple[str, ...], joints: dict[str, Joint]) -> Chain:
+    return Chain(
+        name=arm.gripper,
+        joints=tuple(path_between(joints, robot.base_link, arm.tool_link)),
+        tool=(rotation_matrix(arm.tool_in_link[3:]), arm.tool_in_link[:3]),
+        moving=arm.joints,
+        fixed=fixed,
+        spheres=arm.spheres,
+        against_arms=arm.spheres_between_arms,
+        palm_front=arm.palm_front,
+    )
+
+
+def _exact(values: Array) -> Any:
+    """Constants with structural zeros, which CasADi leaves out of the expressions."""
+    return ca.sparsify(ca.SX(values))
+
+
+def turned(axis: Array, angle: Any) -> Any:
+    """Rotation about a unit axis; about one of the coordinate axes with structural zeros."""
+    if np.count_nonzero(axis) > 1:
+        cross, along = _exact(np.cross(axis, np.eye(3)).T), ca.SX(np.outer(axis, axis))
+        return ca.cos(angle) * (ca.SX.eye(3) - along) + along + ca.sin(angle) * cross
+    index = int(np.argmax(np.abs(axis)))
+    a, b = (index + 1) % 3, (index + 2) % 3
+    sine, cosine = float(axis[index]) * ca.sin(angle), ca.cos(angle)
+    rotation = ca.SX(3, 3)
+    rotation[index, index] = 1
+    rotation[a, a] = rotation[b, b] = cosine
+    rotation[a, b], rotation[b, a] = -sine, sine
+    return rotation

@@ -1,0 +1,81 @@
+"""Where poses and joints stand in the values of a program: variables first, then constants.
+
+Slots of constants are negative until the number of variables is known.
+"""
+
+from dataclasses import dataclass, field, replace
+
+ZERO = -1
+"""Slot of the constant 0."""
+
+
+@dataclass(frozen=True)
+class PlanarPose:
+    """Pose of a level body: slots of x, y, yaw and z in the values, and an offset of z (m)."""
+
+    x: int
+    y: int
+    yaw: int
+    z: int
+    offset: float
+
+    @property
+    def plane(self) -> tuple[int, int, int]:
+        """Slots of x, y and yaw."""
+        return self.x, self.y, self.yaw
+
+    @property
+    def varies(self) -> bool:
+        """Whether the place is not a constant."""
+        return max(self.plane) >= 0
+
+    def raised(self, height: float) -> "PlanarPose":
+        """The same place, higher (m)."""
+        return replace(self, offset=self.offset + height)
+
+
+@dataclass(frozen=True)
+class StraightSegment:
+    """The far end of a straight way of the hand from a contact, the hand not turned."""
+
+    joints: tuple[int, ...]
+    back: float
+    """How far the hand is back along its approach (m)."""
+    up: float
+    """How far it is up (m)."""
+
+
+@dataclass(frozen=True)
+class ArmConfiguration:
+    """An arm that holds a level body: the slots of its joints and the body's pose."""
+
+    held: "HeldBox"
+    action: int
+    joints: tuple[int, ...]
+    pose: PlanarPose
+    segments: tuple[StraightSegment, ...] = ()
+
+
+@dataclass(eq=False)
+class HeldBox:
+    """A box in a gripper, from its grasp to the end of it: one pitch and offset of the hand."""
+
+    gripper: str
+    box: str
+    pitch: int
+    offset: int
+    turn: float
+    """Of the box's length against its x axis (rad)."""
+    half_length: float
+    half_height: float
+    configurations: list[ArmConfiguration] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class KeyframeSlots:
+    """Where everything is at one configuration: joint slots by gripper, and boxes."""
+
+    joints: dict[str, tuple[int, ...] | None]
+    """None: at its side."""
+    boxes: dict[str, PlanarPose | HeldBox]
+    """A level pose, or how a box is held at the arm's side."""

@@ -1,0 +1,43 @@
+"""The vocabulary of constraints: one file per term, found by its name.
+
+A term has a kernel (symbolic), the variables that it needs, what a start chooses for them, and a
+numeric check that shares no code with the kernel. Declarations of instructions list terms by name.
+"""
+
+from functools import cache
+from importlib import import_module
+from pkgutil import iter_modules
+
+from guided_lgp.bounds.program.kernels import KernelTable
+from guided_lgp.bounds.program.kinematics import RobotKinematics
+from guided_lgp.bounds.terms.term import Term
+from guided_lgp.errors import InputError
+
+_NOT_TERMS = ("term",)
+
+
+@cache
+def term_names() -> tuple[str, ...]:
+    """All terms, sorted."""
+    modules = (module.name for module in iter_modules(__path__))
+    return tuple(sorted(name for name in modules if name not in _NOT_TERMS))
+
+
+@cache
+def find_term(name: str) -> Term:
+    """The term of a name.
+
+    Raises:
+        InputError: there is none.
+    """
+    if name not in term_names():
+        raise InputError(f"term {name!r}", "is unknown", ", ".join(term_names()))
+    term = import_module(f"{__name__}.{name}").TERM
+    assert isinstance(term, Term)
+    return term
+
+
+@cache
+def kernel_table(robot: RobotKinematics) -> KernelTable:
+    """The kernels of all terms for a robot."""
+    return KernelTable([k for name in term_names() for k in find_term(name).kernels(robot)])

@@ -1,0 +1,65 @@
+"""``apart(gripper, gripper)``: the spheres of two arms keep their distance."""
+
+from itertools import product
+
+import casadi as ca
+
+from guided_lgp.bounds.program.context import Context
+from guided_lgp.bounds.program.kernels import SCALE, Kernel, distance, kernel
+from guided_lgp.bounds.program.kinematics import Chain, RobotKinematics
+from guided_lgp.bounds.terms.term import Term
+
+
+def _kernel(one: Chain, other: Chain, fixed: int) -> Kernel:
+    n, m = len(one.moving), len(other.moving)
+    x, p = ca.SX.sym("x", n + m), ca.SX.sym("p", 3 + fixed)
+    scene, margin = p[2 : 2 + fixed], p[2 + fixed]
+    first, second = one.pose(x[:n], p[0], scene), other.pose(x[n:], p[1], scene)
+    rows = [
+        distance(first.spheres[:, i] - second.spheres[:, j])
+        - one.spheres[i].radius
+        - other.spheres[j].radius
+        - margin
+        for i, j in product(one.against_arms, other.against_arms)
+    ]
+    return kernel(f"apart_{one.name}_{other.name}", x, p, SCALE * ca.vertcat(*rows))
+
+
+def _kernels(robot: RobotKinematics) -> tuple[Kernel, ...]:
+    if len(robot.arms) < 2:
+        return ()
+    return tuple(
+        _kernel(one, other, len(robot.fixed)) for one, other in product(robot.chains, robot.chains)
+    )
+
+
+def keep_apart(
+    context: Context,
+    gripper: str,
+    joints: tuple[int, ...],
+    other: str,
+    others_joints: tuple[int, ...],
+) -> None:
+    """Of one configuration of each arm."""
+    one, two = context.robot.arms[gripper], context.robot.arms[other]
+    count = len(two.chain.against_arms)
+    context.rows(
+        f"apart_{one.chain.name}_{two.chain.name}",
+        (*joints, *others_joints),
+        (one.side, two.side, *context.fixed, context.margins.apart),
+        ("collision", gripper, other),
+        tuple(one.links[i] for i in one.chain.against_arms for _ in range(count)),
+    )
+
+
+def _add(context: Context, gripper: str, other: str) -> None:
+    """At the switch: the other arm's straight lines from the arm at its contact.
+
+    Every configuration keeps apart from where the other arms stand without being told.
+    """
+    posed = context.standing | context.acting
+    for segment in posed[other].segments:
+        keep_apart(context, other, segment.joints, gripper, posed[gripper].joints)
+
+
+TERM = Term(_add, _kernels)

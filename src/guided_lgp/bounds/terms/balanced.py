@@ -1,0 +1,58 @@
+"""``balanced(box, support)``: the centres of mass of a stack are above what supports it."""
+
+import casadi as ca
+import numpy as np
+
+from guided_lgp.bounds.program.context import Context
+from guided_lgp.bounds.program.kernels import SCALE, Kernel, in_frame, kernel
+from guided_lgp.bounds.program.kinematics import RobotKinematics
+from guided_lgp.bounds.program.slots import ZERO
+from guided_lgp.bounds.terms.term import Term
+
+STACK = 8
+"""Most boxes in one sum of weights."""
+_LEAST = 1e-3
+"""Half (m) of the area that is left on a support narrower than the margins."""
+
+
+def _kernels(robot: RobotKinematics) -> tuple[Kernel, ...]:
+    """The centre of mass of up to ``STACK`` boxes is inside the top of their support."""
+    x, p = ca.SX.sym("x", 3 + 2 * STACK), ca.SX.sym("p", 2 + STACK)
+    points = ca.reshape(x[3:], 2, STACK)
+    along, across = in_frame(x[2], ca.mtimes(points, p[2:]) - x[:2])
+    c = ca.vertcat(p[0] - along, p[0] + along, p[1] - across, p[1] + across)
+    return (kernel("balanced", x, p, SCALE * c),)
+
+
+def inner(context: Context, support: str) -> tuple[float, float]:
+    """Half extents (m) of the part of a support's top in which a centre of mass may be."""
+    half, margin = context.half(support), context.margins.balanced
+    return max(half[0] - margin, _LEAST), max(half[1] - margin, _LEAST)
+
+
+def _add(context: Context, box: str, support: str) -> None:
+    """Of the box with all that it carries, after the action, and of all that is below it."""
+    stack = (box, *context.after.carried_by(box))[:STACK]  # of higher towers, verification judges
+    key = (support, *((name, context.pose[name].plane) for name in stack))
+    if key not in context.balanced and any(context.pose[name].varies for name in stack):
+        context.balanced.add(key)
+        _rows(context, stack, support)
+    below = context.after.support_of(support)
+    if below is not None:
+        _add(context, support, below)
+
+
+def _rows(context: Context, stack: tuple[str, ...], support: str) -> None:
+    masses = np.array([context.geometry.bodies[name].mass for name in stack])
+    shares = [*(masses / masses.sum()), *[0.0] * (STACK - len(stack))]
+    points = [slot for name in stack for slot in context.pose[name].plane[:2]]
+    points += [ZERO] * (2 * STACK - len(points))
+    context.rows(
+        "balanced",
+        (*context.pose[support].plane, *points),
+        (*inner(context, support), *shares),
+        ("support", stack[0], support),
+    )
+
+
+TERM = Term(_add, _kernels)

@@ -1,0 +1,110 @@
+"""``beside(box, support)``: a box that comes down from above, or goes up, passes its neighbours.
+
+A line, seen from above, separates the box and each neighbour that reaches as high: its angle is a
+variable of the pair.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from guided_lgp.bounds.program.context import Context
+from guided_lgp.bounds.program.draft import Draft
+from guided_lgp.bounds.program.kernels import SCALE, Kernel, absolute, kernel
+from guided_lgp.bounds.program.kinematics import RobotKinematics
+from guided_lgp.bounds.program.slots import PlanarPose
+from guided_lgp.bounds.results import Array
+from guided_lgp.bounds.terms.term import Term
+
+_TOUCH = 0.002
+"""Heights (m) that differ by less are one."""
+
+
+@dataclass(frozen=True)
+class Separation:
+    """Two level boxes beside each other, and the slot of the angle that separates them."""
+
+    angle: int
+    first: PlanarPose
+    second: PlanarPose
+    halves: tuple[float, float, float, float]
+
+    def start(self, draft: Draft) -> None:
+        """The best direction along an axis of the boxes."""
+        if self.angle >= draft.kept:
+            poses = draft.pose(self.first), draft.pose(self.second)
+            draft.values[self.angle] = _separation(*poses, self.halves)[1]
+
+    def overlap(self, draft: Draft, first: Array) -> float:
+        """How much (m) the first box, if it stood there, would overlap the second."""
+        return max(0.0, -_separation(first, draft.pose(self.second), self.halves)[0])
+
+
+def _kernels(robot: RobotKinematics) -> tuple[Kernel, ...]:
+    x, p = ca.SX.sym("x", 7), ca.SX.sym("p", 5)
+    first, second, angle = x[:3], x[3:6], x[6]
+    normal = ca.vertcat(ca.cos(angle), ca.sin(angle))
+    extent: Any = 0
+    for pose, half in ((first, p[:2]), (second, p[2:4])):
+        cosine, sine = ca.cos(pose[2]), ca.sin(pose[2])
+        extent += half[0] * absolute(normal[0] * cosine + normal[1] * sine)
+        extent += half[1] * absolute(-normal[0] * sine + normal[1] * cosine)
+    gap = ca.dot(normal, second[:2] - first[:2])
+    return (kernel("beside", x, p, SCALE * (gap - extent - p[4])),)
+
+
+def _add(context: Context, box: str, support: str | None = None) -> None:
+    """Of a box, with all that it carries, on its support."""
+    moved = (box, *context.state.carried_by(box))
+    support = support or context.state.support_of(box)
+    for name in moved:
+        for other in (*context.geometry.boxes, *context.geometry.tables):
+            if other in moved or other == support or context.at_side(other):
+                continue
+            if _neighbours(context, name, other):
+                _separate(context, name, other)
+
+
+def _neighbours(context: Context, name: str, other: str) -> bool:
+    """Whether a box has to be separated from another body: it may move and is not above it."""
+    first, second = context.pose[name], context.pose[other]
+    bottom = first.offset - context.half(name)[2]
+    top = second.offset + context.half(other)[2]
+    return (first.varies or second.varies) and first.z == second.z and top > bottom + _TOUCH
+
+
+def _separate(context: Context, name: str, other: str) -> None:
+    first, second = context.pose[name], context.pose[other]
+    pair = frozenset((first.plane, second.plane))
+    if pair in context.separated:
+        return
+    context.separated.add(pair)
+    angle = context.program.variable(-4 * np.pi, 4 * np.pi, 1e-6, 0.0)
+    halves = (*context.half(name)[:2], *context.half(other)[:2])
+    context.rows(
+        "beside",
+        (*first.plane, *second.plane, angle),
+        (*halves, context.margins.beside),
+        ("overlap", name, other),
+    )
+    context.choose(Separation(angle, first, second, halves))
+
+
+def _separation(
+    first: Array, second: Array, halves: tuple[float, float, float, float]
+) -> tuple[float, float]:
+    """Largest distance (m) along the boxes' axes that separates them, and that direction (rad)."""
+    angles = np.concatenate([first[2] + _QUARTERS, second[2] + _QUARTERS])
+    normals = np.stack([np.cos(angles), np.sin(angles)])
+    distance = (second[:2] - first[:2]) @ normals
+    for yaw, (hx, hy) in ((first[2], halves[:2]), (second[2], halves[2:])):
+        distance = distance - hx * np.abs(np.cos(angles - yaw)) - hy * np.abs(np.sin(angles - yaw))
+    best = int(np.argmax(distance))
+    return float(distance[best]), float(angles[best])
+
+
+_QUARTERS = np.arange(4) * np.pi / 2
+
+TERM = Term(_add, _kernels)

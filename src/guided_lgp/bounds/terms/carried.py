@@ -1,0 +1,52 @@
+"""``carried(box)``: what stands on a box keeps its place on it while the box is moved."""
+
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from guided_lgp.bounds.program.context import Context
+from guided_lgp.bounds.program.draft import Draft
+from guided_lgp.bounds.program.kernels import SCALE, Kernel, in_frame, kernel
+from guided_lgp.bounds.program.kinematics import RobotKinematics
+from guided_lgp.bounds.program.slots import PlanarPose
+from guided_lgp.bounds.results import Array
+from guided_lgp.bounds.terms.term import Term
+
+
+def _kernels(robot: RobotKinematics) -> tuple[Kernel, ...]:
+    """Relative poses before and after agree."""
+    x, p = ca.SX.sym("x", 12), ca.SX.sym("p", 0)
+
+    def relative(below: Any, above: Any) -> Any:
+        return ca.vertcat(*in_frame(below[2], above[:2] - below[:2]))
+
+    before, after = relative(x[:3], x[3:6]), relative(x[6:9], x[9:12])
+    turn = (x[11] - x[8]) - (x[5] - x[2])
+    c = ca.vertcat(SCALE * (after - before), turn)
+    return (kernel("carried", x, p, c, equality=True, lengths=2),)
+
+
+def _add(context: Context, box: str) -> None:
+    """What stands on the box goes with it from where it was before the action."""
+    old, new = context.before[box], context.pose[box]
+    for name in context.state.carried_by(box):
+        above = context.pose[name]
+        rise = above.offset - old.offset
+        after = PlanarPose(*context.plane(), new.z, new.offset + rise)
+        inputs = (*old.plane, *above.plane, *new.plane, *after.plane)
+        context.rows("carried", inputs, (), ("carried", name, box))
+        context.pose[name] = after
+
+
+def carry(draft: Draft, old: Array, before: Array, new: Array, after: PlanarPose) -> None:
+    """The start of a pose after a move, from the carrier's old and new one."""
+    turn = new[2] - old[2]
+    cosine, sine = np.cos(turn), np.sin(turn)
+    dx, dy = before[0] - old[0], before[1] - old[1]
+    draft.values[after.x] = new[0] + cosine * dx - sine * dy
+    draft.values[after.y] = new[1] + sine * dx + cosine * dy
+    draft.values[after.yaw] = before[2] + turn
+
+
+TERM = Term(_add, _kernels)

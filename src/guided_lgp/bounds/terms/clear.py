@@ -1,0 +1,50 @@
+"""``clear(gripper, body)``: the spheres of an arm keep their distance from a level box or table."""
+
+import casadi as ca
+
+from guided_lgp.bounds.program.context import Context
+from guided_lgp.bounds.program.kernels import SCALE, Kernel, distance, in_frame, kernel
+from guided_lgp.bounds.program.kinematics import Chain, RobotKinematics
+from guided_lgp.bounds.terms.term import Term
+
+
+def _kernel(chain: Chain, fixed: int) -> Kernel:
+    n = len(chain.moving)
+    x, p = ca.SX.sym("x", n + 4), ca.SX.sym("p", 6 + fixed)
+    q, pose, z = x[:n], x[n : n + 3], x[n + 3]
+    side, scene = p[0], p[1 : 1 + fixed]
+    z_offset, half, margin = p[1 + fixed], p[2 + fixed : 5 + fixed], p[5 + fixed]
+    arm = chain.pose(q, side, scene)
+    rows = []
+    for i, sphere in enumerate(chain.spheres):
+        d = arm.spheres[:, i] - ca.vertcat(pose[0], pose[1], z + z_offset)
+        outside = ca.fabs(ca.vertcat(*in_frame(pose[2], d), d[2])) - half
+        inside = ca.fmin(ca.fmax(ca.fmax(outside[0], outside[1]), outside[2]), 0)
+        rows.append(SCALE * (distance(ca.fmax(outside, 0)) + inside - sphere.radius - margin))
+    return kernel(f"clear_{chain.name}", x, p, ca.vertcat(*rows))
+
+
+def _kernels(robot: RobotKinematics) -> tuple[Kernel, ...]:
+    return tuple(_kernel(chain, len(robot.fixed)) for chain in robot.chains)
+
+
+def keep_clear(context: Context, gripper: str, joints: tuple[int, ...], body: str) -> None:
+    """Of one configuration of an arm."""
+    arm, pose = context.robot.arms[gripper], context.pose[body]
+    context.rows(
+        f"clear_{arm.chain.name}",
+        (*joints, *pose.plane, pose.z),
+        (*context.arm_parameters(arm), pose.offset, *context.half(body), context.margins.clear),
+        ("collision", gripper, body),
+        arm.links,
+    )
+
+
+def _add(context: Context, gripper: str, body: str) -> None:
+    """Where the arm stands, or is at the switch."""
+    posed = (context.standing | context.acting).get(gripper)
+    joints = context.home[gripper] if posed is None else posed.joints
+    keep_clear(context, gripper, joints, body)
+
+
+TERM = Term(_add, _kernels)

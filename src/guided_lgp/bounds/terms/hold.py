@@ -1,0 +1,314 @@
+"""``hold(gripper, box)``: the gripper is where its grasp of the box wants it.
+
+A grasped box is rigid in the gripper from its grasp on, until it hangs on something else: one pitch
+and one offset of the hand for the whole mode. The arm's joints are variables of each configuration,
+and of the far end of each straight way to it or from it.
+"""
+
+from collections.abc import Iterable
+from functools import cache
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from guided_lgp import poses
+from guided_lgp.bounds.program.closed_form import human_like, inverse
+from guided_lgp.bounds.program.context import Context, Line
+from guided_lgp.bounds.program.draft import Draft
+from guided_lgp.bounds.program.kernels import SCALE, Kernel, absolute, kernel
+from guided_lgp.bounds.program.kinematics import Chain, RobotKinematics
+from guided_lgp.bounds.program.slots import (
+    ArmConfiguration,
+    HeldBox,
+    PlanarPose,
+    StraightSegment,
+)
+from guided_lgp.bounds.results import Array
+from guided_lgp.bounds.terms.term import Term, UngraspableError
+
+PALM_GAP = 0.002
+"""Distance of the box's nearest corner from the palm (m)."""
+PAD_MARGIN = 0.01
+"""How far inside the box's side the fingertips are (m)."""
+
+
+def tool_target(
+    pose: Any, height: Any, pitch: Any, offset: Any, p: Any, palm_front: float
+) -> tuple[Any, Any]:
+    """Where the tool must be to hold a level box.
+
+    The fingers close across the box's width; the approach axis lies in the vertical plane along
+    its length, ``pitch`` below the horizontal (pi/2: from above; beyond: from the other end). The
+    palm touches the box's nearest corner, ``offset`` moves the tool along its own z axis.
+
+    Args:
+        pose: (x, y, yaw) of the box.
+        height: z of its centre (m).
+        pitch: of the approach (rad), in [0, pi].
+        offset: along the tool's z axis (m).
+        p: (half length, half height, turn of the length against the box's x axis, distance back
+            along the approach).
+        palm_front: x of the palm's front in the tool frame (m).
+
+    Returns:
+        position (3,) and rotation (3, 3) of the tool.
+    """
+    half_length, half_height, turn, back = (p[i] for i in range(4))
+    heading = pose[2] + turn
+    ch, sh, cp, sp = ca.cos(heading), ca.sin(heading), ca.cos(pitch), ca.sin(pitch)
+    x_axis = ca.vertcat(ch * cp, sh * cp, -sp)
+    y_axis = ca.vertcat(-sh, ch, 0)
+    z_axis = ca.vertcat(ch * sp, sh * sp, cp)
+    reach = half_length * absolute(cp) + half_height * sp + palm_front + PALM_GAP
+    centre = ca.vertcat(pose[0], pose[1], height)
+    return centre - (reach + back) * x_axis - offset * z_axis, ca.horzcat(x_axis, y_axis, z_axis)
+
+
+def _kernel(chain: Chain, fixed: int) -> Kernel:
+    """Tool frame of the arm = target of the grasp.
+
+    The orientation is written as the whole y axis and the whole direction of gravity, which vanish
+    together at the target only.
+    """
+    n = len(chain.moving)
+    x, p = ca.SX.sym("x", n + 6), ca.SX.sym("p", 7 + fixed)
+    q, pitch, offset, pose, z = x[:n], x[n], x[n + 1], x[n + 2 : n + 5], x[n + 5]
+    side, scene, (z_offset, up) = p[0], p[1 : 1 + fixed], (p[1 + fixed], p[2 + fixed])
+    arm = chain.pose(q, side, scene)
+    grasp = p[3 + fixed : 7 + fixed]
+    position, rotation = tool_target(
+        pose, z + z_offset + up, pitch, offset, grasp, chain.palm_front
+    )
+    c = ca.vertcat(
+        SCALE * (arm.position - position),
+        arm.rotation[:, 1] - rotation[:, 1],
+        arm.rotation[2, 0] - rotation[2, 0],
+        arm.rotation[2, 2] - rotation[2, 2],
+    )
+    twist = ca.mtimes(rotation.T, arm.rotation)
+    # Rodrigues' vector of the rotation between the two: axis times tan(angle / 2)
+    rodrigues = ca.vertcat(
+        twist[2, 1] - twist[1, 2], twist[0, 2] - twist[2, 0], twist[1, 0] - twist[0, 1]
+    ) / (1 + ca.trace(twist))
+    return kernel(
+        f"hold_{chain.name}", x, p, c, True, lengths=3, independent=ca.vertcat(c[:3], rodrigues)
+    )
+
+
+def _kernels(robot: RobotKinematics) -> tuple[Kernel, ...]:
+    return tuple(_kernel(chain, len(robot.fixed)) for chain in robot.chains)
+
+
+def _add(context: Context, gripper: str, box: str) -> None:
+    """The arm's configuration at the switch; nothing if it stands there with the box already."""
+    pose, standing = context.pose[box], context.standing.get(gripper)
+    if standing is None or standing.pose is not pose:
+        held, lines = grip(context, gripper, box), context.lines_of(gripper)
+        context.acting[gripper] = configuration(context, held, pose, lines)
+
+
+def grip(context: Context, gripper: str, box: str) -> HeldBox:
+    """How the gripper holds the box: as it does already, or a new grasp with its variables.
+
+    Raises:
+        UngraspableError: no side of the box is narrow enough for the fingers.
+    """
+    held = context.hands.get(gripper)
+    if held is None:
+        held = context.hands[gripper] = _new_grip(context, gripper, box)
+        context.grips.append(held)
+    return held
+
+
+def _new_grip(context: Context, gripper: str, box: str) -> HeldBox:
+    turn, along, width = context.geometry.grasp_side(box)
+    widest = context.robot.arms[gripper].arm.fingers.grasp_width
+    if width > widest:
+        raise UngraspableError(context.action, box, width - widest)
+    height = context.half(box)[2]
+    slide = max(along, height) - PAD_MARGIN
+    return HeldBox(
+        gripper,
+        box,
+        pitch=context.program.variable(0.0, np.pi, 1e-3, np.pi / 2),
+        offset=context.program.variable(-slide, slide, 0.05, 0.0),
+        turn=turn,
+        half_length=along,
+        half_height=height,
+    )
+
+
+def configuration(
+    context: Context, held: HeldBox, pose: PlanarPose, lines: Iterable[Line] = ()
+) -> ArmConfiguration:
+    """The arm holds its box at a level pose, and can move along straight lines."""
+    joints = _joint_variables(context, held)
+    _rows(context, held, joints, pose, 0.0, 0.0)
+    segments = []
+    for line in lines:
+        end = _joint_variables(context, held, contact=joints)
+        _rows(context, held, end, pose, line.back, line.up)
+        segments.append(StraightSegment(end, line.back, line.up))
+    added = ArmConfiguration(held, context.action, joints, pose, tuple(segments))
+    held.configurations.append(added)
+    context.added.append(added)
+    return added
+
+
+def _joint_variables(
+    context: Context, held: HeldBox, contact: tuple[int, ...] | None = None
+) -> tuple[int, ...]:
+    """Slots of an arm's joints; at the end of a segment, the redundant one is the contact's."""
+    arm = context.robot.arms[held.gripper]
+    shared = None if contact is None else arm.arm.redundant
+    joints = []
+    for index, ((low, high), home) in enumerate(zip(arm.limits, arm.home, strict=True)):
+        if contact is not None and index == shared:
+            joints.append(contact[index])
+        else:
+            joints.append(context.program.variable(low, high, 1e-3, home, shared=False))
+    return tuple(joints)
+
+
+def _rows(
+    context: Context,
+    held: HeldBox,
+    joints: tuple[int, ...],
+    pose: PlanarPose,
+    back: float,
+    up: float,
+) -> None:
+    arm = context.robot.arms[held.gripper]
+    grasp = (held.half_length, held.half_height, held.turn, back)
+    context.rows(
+        f"hold_{arm.chain.name}",
+        (*joints, held.pitch, held.offset, *pose.plane, pose.z),
+        (*context.arm_parameters(arm), pose.offset, up, *grasp),
+        ("reach", held.gripper, held.box),
+    )
+
+
+def in_tool(held: HeldBox, values: Array, chain: Chain) -> Array:
+    """Pose (7,) of a held box in the tool frame of its gripper."""
+    pitch, offset = values[held.pitch], values[held.offset]
+    reach = held.half_length * abs(np.cos(pitch)) + held.half_height * np.sin(pitch)
+    level = np.array([0.0, -np.sin(pitch / 2), 0.0, np.cos(pitch / 2)])
+    turned = poses.multiply(level, poses.pose((0, 0, 0), -held.turn)[3:])
+    return np.array([reach + chain.palm_front + PALM_GAP, 0.0, offset, *turned])
+
+
+# starts
+
+
+def start(draft: Draft, held: HeldBox) -> None:
+    """Choose one pitch for a mode and the joints of its configurations."""
+    if all(configuration.joints[0] < draft.kept for configuration in held.configurations):
+        return
+    places = [draft.pose(configuration.pose) for configuration in held.configurations]
+    tried = pitches(draft, held)
+    if held.pitch >= draft.kept:
+        tried = tried + draft.noise * draft.generator.uniform(-_PITCH_SPREAD, _PITCH_SPREAD)
+        costs = sum(
+            least_costs(draft, held, place[None], configuration.segments, tried)[0]
+            for configuration, place in zip(held.configurations, places, strict=True)
+        )
+        tried = tried[[draft.choose(np.asarray(costs))]]
+        draft.values[held.pitch] = tried[0]
+    for configuration, place in zip(held.configurations, places, strict=True):
+        if configuration.joints[0] >= draft.kept:
+            joints, costs = _solutions(draft, held, place[None], configuration.segments, tried)
+            chosen = draft.choose(costs[0, 0])
+            ends = (configuration.joints, *(s.joints for s in configuration.segments))
+            for slots, values in zip(ends, joints[0, 0, :, chosen], strict=True):
+                draft.values[list(slots)] = values
+
+
+def pitches(draft: Draft, held: HeldBox) -> Array:
+    """Pitches (rad) that are tried: the one of before where there is one."""
+    if held.pitch < draft.kept:
+        return draft.values[[held.pitch]]
+    return _PITCHES
+
+
+def least_costs(
+    draft: Draft,
+    held: HeldBox,
+    poses: Array,
+    segments: tuple[StraightSegment, ...],
+    tried: Array,
+) -> Array:
+    """Least cost (len(poses), len(pitches)) of holding a box there, over the redundant joint."""
+    return np.asarray(_solutions(draft, held, poses, segments, tried)[1].min(axis=2))
+
+
+def _solutions(
+    draft: Draft,
+    held: HeldBox,
+    poses: Array,
+    segments: tuple[StraightSegment, ...],
+    tried: Array,
+) -> tuple[Array, Array]:
+    """Inverse kinematics of a contact and the ends of its segments.
+
+    Returns:
+        joints (poses, pitches, 1 + segments, candidates, n) and costs (poses, pitches, candidates).
+    """
+    arm = draft.robot.arms[held.gripper]
+    ends = np.array([(0.0, 0.0), *((segment.back, segment.up) for segment in segments)])
+    shape = (len(poses), len(tried), len(ends), 2 * len(_PANS))
+    arguments = np.empty((*shape, REACH_INPUTS))
+    arguments[..., :4] = poses[:, None, None, None]
+    arguments[..., 4] = tried[:, None, None]
+    arguments[..., 5] = float(draft.values[held.offset])
+    arguments[..., 6] = np.tile(_PANS, 2)
+    arguments[..., 7] = np.repeat([1.0, -1.0], len(_PANS))
+    arguments[..., 8] = arm.side
+    arguments[..., 9] = draft.fixed[0]
+    arguments[..., 10] = ends[:, 1, None]
+    arguments[..., 11:14] = held.half_length, held.half_height, held.turn
+    arguments[..., 14] = ends[:, 0, None]
+    solutions = draft.reach(arguments.reshape(-1, REACH_INPUTS)).reshape(*shape, -1)
+    joints, missing = solutions[..., :-1], solutions[..., -1]
+    low, high = np.array(arm.limits).T
+    beyond = np.maximum(low - joints, 0) + np.maximum(joints - high, 0)
+    motion = ((joints - arm.home) ** 2)[..., :_SHOULDER_JOINTS].sum(axis=-1)
+    costs = _BEYOND * beyond.sum(axis=-1) + _MISSING * missing + _MOTION * motion
+    return np.clip(joints, low, high), costs.sum(axis=2)
+
+
+_PANS = np.linspace(-0.65, 1.6, 10)
+"""Values (rad) of the redundant joint that are tried: shoulder pan, left arm."""
+_PITCHES = np.pi * np.array([0.2, 0.35, 0.5, 0.65, 0.8])
+"""Pitches (rad) of the approach that are tried, from one end of the box over the top."""
+_PITCH_SPREAD = 0.4
+"""How far (rad) they are moved in a start with noise: to the middle between two."""
+_MISSING = 20.0
+"""Cost per m that is missing to reach: 5 cm, about a hand's way out of reach, cost 1."""
+_BEYOND = 5.0
+"""Cost per rad beyond joint limits: they can be mended by turning the hand about the box."""
+_MOTION = 0.05
+"""Cost per rad^2 of shoulder and elbow from the arm's side: only among what is reached."""
+_SHOULDER_JOINTS = 4
+"""The joints that move most of the arm; the wrist turns at no cost."""
+REACH_INPUTS = 15
+
+
+@cache
+def reach_function(robot: RobotKinematics) -> Any:
+    """CasADi function of one closed-form inverse kinematics.
+
+    Inputs (15,): pose (x, y, yaw) and height of the box, pitch, offset, shoulder pan, branch, side,
+    torso, lift above the box's place, half length, half height, turn, distance back.
+    Outputs (8,): joint values (mirrored for the right arm) and the distance missing to reach (m).
+    """
+    (chain,) = robot.chains
+    lengths = human_like(chain)
+    assert lengths is not None
+    x = ca.SX.sym("x", REACH_INPUTS)
+    position, rotation = tool_target(x[:3], x[3] + x[10], x[4], x[5], x[11:15], chain.palm_front)
+    solution = inverse(lengths, position, rotation, x[6], x[7], x[8], x[9])
+    return ca.Function("reach", [x], [solution])
+
+
+TERM = Term(_add, _kernels)

@@ -1,0 +1,105 @@
+"""``stand(box, support)``: a box is put down level on a support, with all that it carries."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from guided_lgp.bounds.program.context import Context, Start
+from guided_lgp.bounds.program.draft import Draft
+from guided_lgp.bounds.program.slots import HeldBox, PlanarPose, StraightSegment
+from guided_lgp.bounds.results import Array
+from guided_lgp.bounds.terms import carried
+from guided_lgp.bounds.terms.balanced import inner
+from guided_lgp.bounds.terms.beside import Separation
+from guided_lgp.bounds.terms.hold import least_costs, pitches
+from guided_lgp.bounds.terms.term import Term
+
+CANDIDATES = 6
+"""Placements drawn, of which the best to reach is taken."""
+_OVERLAP = 20.0
+"""Cost per m of overlap with a neighbour: as much as what is missing to reach."""
+
+
+@dataclass(frozen=True)
+class Placement:
+    """A box put on a support; the boxes that it carries move along (old and new poses)."""
+
+    action: int
+    held: HeldBox
+    old: PlanarPose
+    pose: PlanarPose
+    support: PlanarPose
+    half: tuple[float, float]
+    """Half extents (m) within which the centre must be."""
+    carried: tuple[tuple[PlanarPose, PlanarPose], ...]
+    others: Sequence[Start]
+    """What else the action leaves to the start; the separations from neighbours are there."""
+
+    def start(self, draft: Draft) -> None:
+        """Of a few places drawn on the support, one that is reached and free."""
+        if self.pose.x < draft.kept:
+            return
+        candidates = self._draw(draft)
+        overlaps = self._overlaps(draft, candidates)
+        first, tried = self.held.configurations[0], pitches(draft, self.held)
+        origin = draft.pose(first.pose)
+        grasp = least_costs(draft, self.held, origin[None], first.segments, tried)
+        place = least_costs(draft, self.held, candidates, self._segments(), tried)
+        best = draft.choose((grasp + place).min(axis=1) + overlaps)
+        for slot, value in zip(self.pose.plane, candidates[best], strict=False):
+            draft.values[slot] = value
+        for before, after in self.carried:
+            old, above, new = (draft.pose(pose) for pose in (self.old, before, self.pose))
+            carried.carry(draft, old, above, new, after)
+
+    def _draw(self, draft: Draft) -> Array:
+        """Poses (CANDIDATES, 4) on the support."""
+        support = draft.pose(self.support)
+        local = draft.generator.uniform(-1, 1, (CANDIDATES, 2)) * np.array(self.half)
+        cosine, sine = np.cos(support[2]), np.sin(support[2])
+        candidates = np.empty((CANDIDATES, 4))
+        candidates[:, 0] = support[0] + cosine * local[:, 0] - sine * local[:, 1]
+        candidates[:, 1] = support[1] + sine * local[:, 0] + cosine * local[:, 1]
+        candidates[:, 2] = draft.generator.uniform(-np.pi / 2, np.pi / 2, CANDIDATES)
+        candidates[:, 3] = support[3] + self.pose.offset - self.support.offset
+        return candidates
+
+    def _overlaps(self, draft: Draft, candidates: Array) -> Array:
+        """Costs (CANDIDATES,) of what each candidate overlaps beside it."""
+        total = np.zeros(len(candidates))
+        for other in self.others:
+            if isinstance(other, Separation) and other.first is self.pose:
+                total += np.array([other.overlap(draft, candidate) for candidate in candidates])
+        return _OVERLAP * total
+
+    def _segments(self) -> tuple[StraightSegment, ...]:
+        """The straight segments of the arm that puts the box down."""
+        configurations = reversed(self.held.configurations)
+        return next(c.segments for c in configurations if c.action == self.action)
+
+
+def _add(context: Context, box: str, support: str) -> None:
+    """The pose of the box on its support is a choice of this action."""
+    old, below = context.pose[box], context.pose[support]
+    height = context.half(support)[2] + context.half(box)[2]
+    pose = PlanarPose(*context.plane(), below.z, below.offset + height)
+    riders = context.state.carried_by(box)
+    before = [context.pose[name] for name in riders]
+    context.pose[box] = pose
+    carried.TERM.add(context, box)
+    context.choose(
+        Placement(
+            action=context.action,
+            held=context.held[box],
+            old=old,
+            pose=pose,
+            support=below,
+            half=inner(context, support),
+            carried=tuple(zip(before, (context.pose[name] for name in riders), strict=True)),
+            others=context.choices[-1],
+        )
+    )
+
+
+TERM = Term(_add)

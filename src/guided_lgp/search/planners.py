@@ -1,0 +1,196 @@
+"""The planners: which searches there are, and the rows in which experiments compare them.
+
+The experiments, the report, the command line and :func:`guided_lgp.plan` take their lists from
+here. Nothing heavy is imported before a search is called.
+"""
+
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from guided_lgp.errors import InputError
+
+if TYPE_CHECKING:
+    from guided_lgp.search.problem import Problem
+    from guided_lgp.search.result import SearchResult
+
+
+@dataclass(frozen=True)
+class Search:
+    """A way to search."""
+
+    function: str
+    """``module:name`` in this package, of a function of a problem."""
+    summary: str
+    """What it does, for the help of the command line."""
+    follows_policy: bool = False
+
+    def plan(self, problem: "Problem") -> "SearchResult":
+        """Search for a plan."""
+        module, name = self.function.split(":")
+        found: SearchResult = getattr(import_module(f"{__package__}.{module}"), name)(problem)
+        return found
+
+
+SEARCHES: Mapping[str, Search] = {
+    "guided": Search("guided:plan", "follow the policy, as in the paper", follows_policy=True),
+    "best-first": Search(
+        "best_first:plan",
+        "the policy, but going back to any other action where needed",
+        follows_policy=True,
+    ),
+    "breadth-first": Search("breadth_first:plan", "without a policy, as the original LGP"),
+    "graph": Search("graph:plan", "breadth-first over distinct states"),
+    "astar": Search("best_first:plan_shortest", "A* with landmark-cut, without a policy"),
+}
+"""Every search, by the name under which users ask for it."""
+
+
+UNIFORM = "uniform"
+"""The policy that knows nothing: the control that shows what best-first search owes to its bound on
+the missing actions alone."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Planner:
+    """A search with the policy that it follows: a row of the tables, a curve of the figures."""
+
+    name: str
+    """Its key in Table III."""
+    label: str
+    search: str
+    """One of :data:`SEARCHES`."""
+    policy: str = ""
+    """A trained policy, :data:`UNIFORM`, or empty: none."""
+    adapt: bool = True
+    """Objective adaptation (paper, Sec. III-A)."""
+    table_1: str | None = None
+    """Its key in Table I, if it takes part in the test of generalization."""
+    table_3: bool = True
+    """Whether it takes part in the comparison of scalability."""
+    color: str | None = None
+    """If it is not that of its policy."""
+    marker: str = "D"
+    linestyle: str = "-"
+
+    @property
+    def trained(self) -> bool:
+        """Whether it follows a trained policy."""
+        return self.policy not in ("", UNIFORM)
+
+    @property
+    def strategy(self) -> str:
+        """How it follows its policy, in words."""
+        if self.search == "guided":
+            return "objective adaptation" if self.adapt else "default"
+        return self.search
+
+    def plan(self, problem: "Problem") -> "SearchResult":
+        """Search for a plan; the problem brings the policy."""
+        return SEARCHES[self.search].plan(problem)
+
+
+def _default(name: str, policy: str, table_1: str) -> Planner:
+    """The paper's default: greedy, every goal encoded, in Table I alone."""
+    return Planner(
+        name=name,
+        label=f"{policy.capitalize()}, default",
+        search="guided",
+        policy=policy,
+        adapt=False,
+        table_1=table_1,
+        table_3=False,
+    )
+
+
+def _greedy(name: str, label: str, policy: str, table_1: str) -> Planner:
+    return Planner(
+        name=name,
+        label=label,
+        search="guided",
+        policy=policy,
+        table_1=table_1,
+        marker="o",
+        linestyle="--",
+    )
+
+
+def _complete(name: str, label: str, policy: str, table_1: str) -> Planner:
+    return Planner(name=name, label=label, search="best-first", policy=policy, table_1=table_1)
+
+
+PLANNERS: Mapping[str, Planner] = {
+    planner.name: planner
+    for planner in (
+        Planner(
+            name="breadth_first",
+            label="Breadth-first",
+            search="breadth-first",
+            color="#333333",
+            marker="s",
+        ),
+        Planner(
+            name="breadth_first_graph",
+            label="Graph breadth-first",
+            search="graph",
+            color="#E69F00",
+            marker="^",
+        ),
+        Planner(name="astar", label="A*", search="astar", color="#D55E00", marker="P"),
+        Planner(
+            name="uniform_best_first",
+            label="Best-first, no policy",
+            search="best-first",
+            policy=UNIFORM,
+            table_1="uniform_best_first",
+            color="#56B4E9",
+            marker="v",
+        ),
+        _default("guided_default", "paper", "default"),
+        _greedy("guided", "Guided", "paper", "adaptation"),
+        _complete("guided_best_first", "Guided best-first", "paper", "best_first"),
+        _default("improved_default", "improved", "improved_default"),
+        _greedy("improved", "Improved", "improved", "improved_adaptation"),
+        _complete("improved_best_first", "Improved best-first", "improved", "improved_best_first"),
+        _greedy("relational", "Relational", "relational", "relational"),
+        _complete(
+            "relational_best_first", "Relational best-first", "relational", "relational_best_first"
+        ),
+    )
+}
+"""Every planner that the experiments compare, in the order of the tables and legends."""
+
+TABLE_3 = {name: planner for name, planner in PLANNERS.items() if planner.table_3}
+"""Planners of the comparison of scalability, in the order of every table and legend."""
+
+RIVALS = tuple(name for name, planner in TABLE_3.items() if not planner.trained)
+"""Of these, the ones without a trained policy."""
+
+GUIDED = tuple(name for name, planner in TABLE_3.items() if planner.trained)
+"""Of these, the ones with one."""
+
+
+def controls_last(planners: Iterable[Planner]) -> list[Planner]:
+    """Planners in the order in which they run: trained ones, the control, those without policy."""
+    return sorted(planners, key=lambda planner: (not planner.policy, not planner.trained))
+
+
+TABLE_1 = {
+    planner.table_1: planner
+    for planner in controls_last(PLANNERS.values())
+    if planner.table_1 is not None
+}
+"""Planners of the test of generalization, in the order of Table I, by their keys there."""
+
+
+def check_policies(known: Collection[str]) -> None:
+    """Refuse a row that names a policy that nobody has declared.
+
+    Raises:
+        InputError: names the row and the policies known.
+    """
+    for planner in PLANNERS.values():
+        if planner.trained and planner.policy not in known:
+            fault = f"policy {planner.policy!r} is unknown"
+            raise InputError(f"planner {planner.name!r}", fault, ", ".join(known))

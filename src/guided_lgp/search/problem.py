@@ -1,0 +1,37 @@
+"""What a planner is given."""
+
+from dataclasses import dataclass
+
+from guided_lgp.logic import Objective, Symbols, validate_objective
+from guided_lgp.params import SearchLimits
+from guided_lgp.scene import Scene
+from guided_lgp.search.bounds import Bounds
+from guided_lgp.search.policy import Policy
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A task, the bounds that judge its sequences, and what guides the search.
+
+    Raises:
+        InputError: the objective is contradictory, unknown or already satisfied.
+    """
+
+    scene: Scene
+    objective: Objective
+    limits: SearchLimits
+    bounds: Bounds
+    policy: Policy | None = None
+    """For the planners that follow one."""
+    adapt: bool = True
+    """Objective adaptation: the policy sees only the goals that do not hold yet (Sec. III-A)."""
+    restriction: Symbols | None = None
+    """The symbols that actions may name, if not all of the scene."""
+
+    def __post_init__(self) -> None:
+        validate_objective(self.objective, self.symbols, self.scene.state)
+
+    @property
+    def symbols(self) -> Symbols:
+        """The symbols that actions may name."""
+        return self.restriction or self.scene.symbols

@@ -1,0 +1,99 @@
+"""The tree of sequences behind the searches that ask the coarse bound before they go on."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from guided_lgp.bounds.results import Keyframe
+from guided_lgp.logic import (
+    Action,
+    Skeleton,
+    State,
+    applicable_actions,
+    satisfied,
+    successor,
+    unsatisfied,
+)
+from guided_lgp.search.observation import observe, start
+from guided_lgp.search.problem import Problem
+from guided_lgp.search.result import Reason, Run, SearchResult
+
+
+@dataclass(frozen=True)
+class Node:
+    """A sequence of actions, and the policy's log-probabilities of it."""
+
+    number: int
+    """Order of generation, which breaks ties."""
+    skeleton: Skeleton
+    state: State
+    log_p: float = 0.0
+    """Of the whole sequence."""
+    discrepancy: float = 0.0
+    """By how much the sequence falls short of the most probable choices, summed over its actions:
+    log p - max log p of the siblings."""
+
+
+class SkeletonTree:
+    """The nodes generated so far; a policy, if there is one, scores the children of each."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.run = Run(problem)
+        self.root = Node(0, (), problem.scene.state)
+        self.size = 1
+
+    def satisfied(self, node: Node) -> bool:
+        """Whether the goals hold at a node."""
+        return satisfied(node.state, self.problem.objective)
+
+    def configuration(self, node: Node) -> Keyframe | None:
+        """x_k = P_coarse(a_1:k)|_k (paper, eq. 3), the arm retreated; None if infeasible."""
+        if not node.skeleton:
+            return start(self.problem.scene)
+        coarse = self.run.coarse(node.skeleton)
+        return coarse.after_action[-1] if coarse.feasible else None
+
+    def expand(self, node: Node, configuration: Keyframe) -> list[Node]:
+        """Generate the children of a node, in the fixed order of the logic.
+
+        Args:
+            node: a node whose sequence is feasible.
+            configuration: x_k, the configuration at the end of that sequence.
+        """
+        actions = list(applicable_actions(node.state, self.problem.symbols))
+        scores = self._scores(node, configuration, actions)
+        best = max(scores)
+        children = [
+            Node(
+                number,
+                (*node.skeleton, action),
+                successor(node.state, action),
+                node.log_p + score,
+                node.discrepancy + score - best,
+            )
+            for number, (action, score) in enumerate(zip(actions, scores, strict=True), self.size)
+        ]
+        self.run.expansions += 1
+        self.size += len(children)
+        return children
+
+    def _scores(
+        self, node: Node, configuration: Keyframe, actions: Sequence[Action]
+    ) -> Sequence[float]:
+        problem = self.problem
+        if problem.policy is None:
+            return [0.0] * len(actions)
+        goals = unsatisfied(node.state, problem.objective) if problem.adapt else problem.objective
+        positions = observe(problem.scene, configuration)
+        scores: list[float] = self.run.log_probabilities(
+            goals, node.state, positions, actions
+        ).tolist()
+        return scores
+
+    def limit_reached(self) -> Reason | None:
+        """The limit that ends the search, if one is reached."""
+        return self.run.limit_reached(self.size)
+
+    def result(self, reason: Reason | None = None) -> SearchResult:
+        """The result of the search: solved, or ended for a reason."""
+        return self.run.result(self.size, reason)

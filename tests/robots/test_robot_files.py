@@ -1,0 +1,111 @@
+"""Every robot that ships: its file against pinocchio, and what is derived where it says nothing."""
+
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+import yaml
+
+from guided_lgp.errors import InputError
+from guided_lgp.poses import rotation_matrix
+from guided_lgp.robots import Robot, load_robot, robot_names
+from guided_lgp.robots.chain import read_chain
+from guided_lgp.robots.inverse import InverseKinematics
+
+_FOLDER = Path(__file__).parents[2] / "src/guided_lgp/robots"
+
+
+@pytest.fixture(params=robot_names())
+def robot(request: pytest.FixtureRequest) -> Robot:
+    return load_robot(request.param)
+
+
+def changed(tmp_path: Path, name: str, arm: str, **fields: object) -> Path:
+    """A copy of a robot file beside the original, one of its arms changed."""
+    data = yaml.safe_load((_FOLDER / f"{name}.yaml").read_text())
+    for field, value in fields.items():
+        if value is None:
+            del data["arms"][arm][field]
+        else:
+            data["arms"][arm][field] = value
+    description = data["description"]
+    for key in ("urdf", "srdf"):
+        if "package" not in description:
+            description[key] = str((_FOLDER / description[key]).resolve())
+    for package, folder in description.get("packages", {}).items():
+        description["packages"][package] = str((_FOLDER / folder).resolve())
+    file = tmp_path / "robot.yaml"
+    file.write_text(yaml.safe_dump(data, sort_keys=False))
+    return file
+
+
+def test_the_home_posture_is_free_of_collisions(robot: Robot) -> None:
+    assert np.all(robot.home >= robot.position_limits[:, 0])
+    assert np.all(robot.home <= robot.position_limits[:, 1])
+    model = pin.buildModelFromUrdf(str(robot.urdf))
+    geometry = pin.buildGeomFromUrdf(model, str(robot.urdf), pin.GeometryType.COLLISION)
+    fixed = {joint.joint: joint.default for joint in robot.fixed_joints.values()}
+    q = robot.kinematics.rows(robot.home[None], fixed)[0]
+    geometry.addAllCollisionPairs()
+    data = geometry.createData()
+    pin.computeCollisions(model, model.createData(), geometry, data, q, False)
+    for pair, result in zip(geometry.collisionPairs, data.collisionResults, strict=True):
+        links = frozenset(
+            model.frames[geometry.geometryObjects[body].parentFrame].name
+            for body in (pair.first, pair.second)
+        )
+        assert not result.isCollision() or len(links) == 1 or links in robot.disabled_pairs
+
+
+def test_inverse_kinematics_lead_back_home(robot: Robot) -> None:
+    fixed = {joint.joint: joint.default for joint in robot.fixed_joints.values()}
+    poses = robot.kinematics.link_poses(
+        robot.home[None], fixed, [arm.tool_link for arm in robot.arms.values()]
+    )[0]
+    for arm, pose in zip(robot.arms.values(), poses, strict=True):
+        chain = read_chain(robot.urdf, robot.base_link, arm.tool_link, arm.joints, fixed)
+        solver = InverseKinematics(chain, arm.limits, arm.redundant, arm.home)
+        value = 0.0 if arm.redundant is None else arm.home[arm.redundant]
+        q, valid = solver.inverse(rotation_matrix(pose[3:]), pose[:3], value)
+        assert np.abs(q[valid] - arm.home).max(axis=1).min() < 1e-6
+
+
+def test_measures_are_there(robot: Robot) -> None:
+    for arm in robot.arms.values():
+        assert arm.spheres
+        assert 0 < arm.fingers.grasp_width < arm.fingers.widest
+        assert arm.palm_front < 0
+        assert np.all(arm.lever_arms[:-1] > 0)
+        assert np.all(arm.reaches >= arm.lever_arms - 0.01)
+        assert arm.fingers.value(arm.fingers.widest) == pytest.approx(arm.fingers.opened)
+
+
+def test_signs_of_a_mirrored_arm_are_found(tmp_path: Path) -> None:
+    file = changed(tmp_path, "pr2", "pr2R", signs=None)
+    found = load_robot(str(file)).arms["pr2R"]
+    assert found.signs.tolist() == load_robot("pr2").arms["pr2R"].signs.tolist()
+
+
+def test_an_arm_that_is_no_mirror_image_is_named(tmp_path: Path) -> None:
+    arms = {"side": "l", "mirrors": "pr2L", "signs": None}
+    file = changed(tmp_path, "pr2", "pr2R", **arms)
+    with pytest.raises(InputError, match=r"arms.pr2R.mirrors: is no mirror image of pr2L"):
+        load_robot(str(file))
+
+
+def test_stated_measures_go_before_derived_ones(tmp_path: Path) -> None:
+    arms = {"hand_radius": 0.2, "lever_arms": [1.0] * 7}
+    arm = load_robot(str(changed(tmp_path, "panda", "panda", **arms))).arms["panda"]
+    assert arm.hand_radius == 0.2
+    assert arm.lever_arms.tolist() == [1.0] * 7
+    assert arm.palm_front == load_robot("panda").arms["panda"].palm_front
+
+
+def test_soft_limits_count_unless_the_file_says_otherwise(tmp_path: Path) -> None:
+    file = changed(tmp_path, "pr2", "pr2R")
+    soft = file.read_text().replace("limits: hard", "limits: soft")
+    file.write_text(soft)
+    left = load_robot(str(file)).arms["pr2L"]
+    assert left.limits[0].tolist() == [-0.564601836603, 2.1353981634]
+    assert load_robot("pr2").arms["pr2L"].limits[0].tolist() == [-0.714601836603, 2.2853981634]
