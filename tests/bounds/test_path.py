@@ -11,7 +11,6 @@ from guided_lgp.bounds.results import CoarseResult, Keyframe, PathResult
 from guided_lgp.bounds.verify import verify_path
 from guided_lgp.logic import Goal, Skeleton, parse_skeleton, progress
 from guided_lgp.poses import pose, tilt
-from guided_lgp.scene.pr2 import HOME_CONFIGURATION, tool_poses
 from guided_lgp.scene.world import World
 
 SCENE = scene(
@@ -63,7 +62,7 @@ def test_arms_return_home_and_fingers_open_and_close(bound: PathBound, coarse: C
     trajectory = _solve(bound, coarse, SKELETONS["place"]).trajectory
     assert trajectory is not None
     for row in (trajectory.q[0], trajectory.q[-1]):
-        assert row[:14] == pytest.approx(HOME_CONFIGURATION)
+        assert row[:14] == pytest.approx(SCENE.robot.description.home)
     (attachment,) = trajectory.attachments
     finger = trajectory.q[:, trajectory.joint_names.index("r_gripper_l_finger_joint")]
     assert finger[: attachment.start].max() > finger[attachment.start]
@@ -77,7 +76,7 @@ def test_a_carried_stack_stays_level(bound: PathBound, coarse: CoarseBound) -> N
     assert trajectory is not None
     stack = [a for a in trajectory.attachments if a.start == trajectory.attachments[-1].start]
     assert {attachment.box for attachment in stack} == {"red", "green"}
-    tools = tool_poses(SCENE, trajectory.q[:, :14])["pr2L"]
+    tools = SCENE.robot.tool_poses(trajectory.q[:, :14])["pr2L"]
     rows = slice(stack[0].start, stack[0].end + 1)
     tilts = tilt(tools[rows])
     assert np.ptp(tilts) < 0.02

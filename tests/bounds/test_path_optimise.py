@@ -10,12 +10,14 @@ from guided_lgp.bounds.path.optimise import LEVEL, optimise
 from guided_lgp.bounds.path.situation import Fingers
 from guided_lgp.bounds.results import Array
 from guided_lgp.poses import pose
-from guided_lgp.scene import GRIPPERS
-from guided_lgp.scene.pr2 import FINGER_LIMITS, HOME, HOME_CONFIGURATION, VELOCITY_LIMITS
+from guided_lgp.robots import load_robot
 from guided_lgp.scene.world import initial_poses
 
 SCENE = scene(red=(0.47, 0.2, 0.65, 0.2, "tab1"), green=(0.6, 0.4, 0.65, -0.4, "tab1"))
-FINGERS = dict.fromkeys(GRIPPERS, FINGER_LIMITS[1])
+ROBOT = load_robot("pr2")
+GRIPPERS = ROBOT.grippers
+LEFT = ROBOT.arms["pr2L"]
+FINGERS = {gripper: arm.fingers.opened for gripper, arm in ROBOT.arms.items()}
 AHEAD = np.array([0.2, 0.3, 0.9, -1.6, 0.4, -1.0, 0.3])
 ASIDE = np.array([1.2, -0.2, 1.4, -1.9, 0.9, -1.5, -0.8])
 
@@ -26,9 +28,7 @@ def mover() -> Mover:
 
 
 def around(gripper: str = "pr2L", **boxes: Array) -> Surroundings:
-    return Surroundings(
-        PlanningScene(gripper, initial_poses(SCENE) | boxes), HOME_CONFIGURATION, FINGERS
-    )
+    return Surroundings(PlanningScene(gripper, initial_poses(SCENE) | boxes), ROBOT.home, FINGERS)
 
 
 def straight(*corners: Array) -> Array:
@@ -37,7 +37,7 @@ def straight(*corners: Array) -> Array:
 
 
 def length(path: Array) -> float:
-    return float(np.linalg.norm(np.diff(path, axis=0) / VELOCITY_LIMITS[:7], axis=1).sum())
+    return float(np.linalg.norm(np.diff(path, axis=0) / LEFT.velocity_limits, axis=1).sum())
 
 
 def duration(*motions: Motion) -> float:
@@ -45,13 +45,13 @@ def duration(*motions: Motion) -> float:
 
 
 def free_motion(path: Array, surroundings: Surroundings, level: bool = False) -> Motion:
-    return Motion(surroundings.scene.gripper, path, Transit(surroundings, level))
+    return Motion(ROBOT.arms[surroundings.scene.gripper], path, Transit(surroundings, level))
 
 
 @pytest.mark.parametrize("gripper", GRIPPERS)
 def test_detour_becomes_short_and_smooth(mover: Mover, gripper: str) -> None:
-    mirror = mover.arms[gripper].sign
-    detour = straight(HOME[gripper], mirror * ASIDE, mirror * AHEAD)
+    mirror = ROBOT.arms[gripper].signs
+    detour = straight(ROBOT.arms[gripper].home, mirror * ASIDE, mirror * AHEAD)
     slow = free_motion(detour, around(gripper))
     (fast,) = optimise(mover, [slow])
     assert isinstance(fast, Motion)
@@ -63,10 +63,10 @@ def test_detour_becomes_short_and_smooth(mover: Mover, gripper: str) -> None:
 
 def test_keeps_clear_of_what_is_in_the_way(mover: Mover) -> None:
     """A box hangs where the hand would pass on the direct way: the detour is only shortened."""
-    _, middle = mover.arms["pr2L"].forward((HOME["pr2L"] + AHEAD) / 2)
+    _, middle = mover.arms["pr2L"].forward((LEFT.home + AHEAD) / 2)
     surroundings = around(green=pose(tuple(middle)))
-    assert mover.collision(surroundings, straight(HOME["pr2L"], AHEAD)) is not None
-    found = mover.transit(surroundings, HOME["pr2L"], AHEAD, np.random.default_rng(0))
+    assert mover.collision(surroundings, straight(LEFT.home, AHEAD)) is not None
+    found = mover.transit(surroundings, LEFT.home, AHEAD, np.random.default_rng(0))
     assert found is not None
     slow = [free_motion(path, surroundings) for path in found]
     (fast,) = optimise(mover, slow)
@@ -79,8 +79,8 @@ def test_goes_on_into_a_straight_line_without_a_rest(mover: Mover) -> None:
     tool = mover.tool("pr2L", AHEAD)
     path = mover.line(around(), tool, 0.09 * tool.rotation[:, 0])
     assert isinstance(path, np.ndarray), path
-    line = Motion("pr2L", path)
-    come = free_motion(straight(HOME["pr2L"], AHEAD), around())
+    line = Motion(LEFT, path)
+    come = free_motion(straight(LEFT.home, AHEAD), around())
     (joined,) = optimise(mover, [come, line])
     assert isinstance(joined, Motion)
     assert joined.transit is None
@@ -92,8 +92,8 @@ def test_goes_on_into_a_straight_line_without_a_rest(mover: Mover) -> None:
 
 
 def test_other_steps_stay_where_they_are(mover: Mover) -> None:
-    come = free_motion(straight(HOME["pr2L"], ASIDE), around())
-    go = free_motion(straight(ASIDE, HOME["pr2L"]), around())
+    come = free_motion(straight(LEFT.home, ASIDE), around())
+    go = free_motion(straight(ASIDE, LEFT.home), around())
     close = Fingers("pr2L", 0.1)
     first, second, third = optimise(mover, [come, close, go])
     assert second is close
@@ -108,10 +108,10 @@ def test_level_motion_stays_level(mover: Mover) -> None:
     rotation, position = arm.forward(AHEAD)
     ways = position + np.array([[0, 0, 0], [0.0, 0.2, 0.1], [-0.1, 0.1, 0.1]])
     _, valid = arm.inverse(rotation, ways, np.full(3, AHEAD[0]))
-    side = mover.side("pr2L", AHEAD)
-    assert valid[:, side].all()
+    branch = arm.branch(AHEAD)
+    assert valid[:, branch].all()
     legs = [
-        mover.line(around(), Tool(rotation, a, AHEAD[0], side), b - a) for a, b in pairwise(ways)
+        mover.line(around(), Tool(rotation, a, AHEAD[0], branch), b - a) for a, b in pairwise(ways)
     ]
     slow = [free_motion(np.asarray(leg), around(), level=True) for leg in legs]
     (fast,) = optimise(mover, slow)
@@ -122,7 +122,7 @@ def test_level_motion_stays_level(mover: Mover) -> None:
 
 
 def test_stays_as_it_is_where_nothing_is_gained(mover: Mover) -> None:
-    direct = free_motion(straight(HOME["pr2L"], ASIDE), around())
+    direct = free_motion(straight(LEFT.home, ASIDE), around())
     again = optimise(mover, optimise(mover, [direct]))
     (best,) = again
     assert isinstance(best, Motion)

@@ -2,9 +2,10 @@ import numpy as np
 import pytest
 
 from guided_lgp.bounds.path.timing import INTERVAL, time_path
-from guided_lgp.scene.pr2 import ACCELERATION_LIMITS, HOME, VELOCITY_LIMITS
+from guided_lgp.robots import load_robot
 
-ENDS = np.stack([HOME["pr2L"], HOME["pr2L"] + [-1.0, 0.4, 0.5, -0.3, 2.0, -0.3, -2.5]])
+ARM = load_robot("pr2").arms["pr2L"]
+ENDS = np.stack([ARM.home, ARM.home + np.array([-1.0, 0.4, 0.5, -0.3, 2.0, -0.3, -2.5])])
 
 
 def _curved() -> np.ndarray:
@@ -15,22 +16,22 @@ def _curved() -> np.ndarray:
 
 @pytest.mark.parametrize("path", [ENDS, _curved()], ids=["line", "curve"])
 def test_limits_hold_from_rest_to_rest(path: np.ndarray) -> None:
-    times, rows = time_path(path, "pr2L")
+    times, rows = time_path(path, ARM)
     steps = np.diff(times)
     assert steps.min() > 0
     assert rows[0] == pytest.approx(path[0])
     assert rows[-1] == pytest.approx(path[-1])
     rates = np.diff(rows, axis=0) / steps[:, None]
     changes = np.diff(np.vstack([np.zeros(7), rates, np.zeros(7)]), axis=0) / steps[0]
-    assert np.all(np.abs(rates) <= VELOCITY_LIMITS[:7])
-    assert np.all(np.abs(changes[1:-1]) <= ACCELERATION_LIMITS[:7])
-    assert np.all(2 * np.abs(changes[[0, -1]]) <= ACCELERATION_LIMITS[:7])
+    assert np.all(np.abs(rates) <= ARM.velocity_limits)
+    assert np.all(np.abs(changes[1:-1]) <= ARM.acceleration_limits)
+    assert np.all(2 * np.abs(changes[[0, -1]]) <= ARM.acceleration_limits)
 
 
 def test_a_long_line_is_near_the_time_optimum() -> None:
-    times, _ = time_path(ENDS, "pr2L")
+    times, _ = time_path(ENDS, ARM)
     turn = np.abs(ENDS[1] - ENDS[0])
-    top, gain = VELOCITY_LIMITS[:7], ACCELERATION_LIMITS[:7]
+    top, gain = ARM.velocity_limits, ARM.acceleration_limits
     optimum = np.where(
         turn > top**2 / gain, turn / top + top / gain, 2 * np.sqrt(turn / gain)
     ).max()
@@ -39,6 +40,6 @@ def test_a_long_line_is_near_the_time_optimum() -> None:
 
 
 def test_no_motion_takes_no_time() -> None:
-    times, rows = time_path(np.stack([HOME["pr2L"], HOME["pr2L"]]), "pr2L")
+    times, rows = time_path(np.stack([ARM.home, ARM.home]), ARM)
     assert times.tolist() == [0.0]
     assert rows.shape == (1, 7)

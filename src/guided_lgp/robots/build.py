@@ -90,6 +90,7 @@ def _arm(
         velocity_limits=velocity,
         acceleration_limits=robot.acceleration * velocity,
         redundant=None if arm.redundant is None else arm.joints.index(arm.redundant),
+        closed_form=arm.closed_form,
         mirror_of=arm.mirrors,
         signs=signs,
         tool_link=arm.tool.link,

@@ -44,7 +44,11 @@ class PathBound:
         self._coarse = coarse
         self._solutions = solutions
         self._mover = Mover(scene, _ITERATIONS)
-        self._grips = {box.name: grips_of(box) for box in scene.boxes}
+        self._grips = {
+            (gripper, box.name): grips_of(box, arm)
+            for gripper, arm in self._mover.robot.arms.items()
+            for box in scene.boxes
+        }
         self._world = World(scene)
 
     def solve(self, coarse_result: CoarseResult) -> PathResult:
@@ -78,7 +82,7 @@ class PathBound:
                 continue
             steps = [step for outcome in outcomes for step in outcome.steps]
             for chosen in (optimise(self._mover, steps), steps):
-                trajectory = assemble(task.start, chosen)
+                trajectory = assemble(self._mover.robot, task.start, chosen)
                 report = verify_path(self._world, skeleton, trajectory)
                 if report.violation is None:
                     break

@@ -7,6 +7,7 @@ A check takes about 10 us: forward kinematics, bounding boxes of all bodies, the
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import coal
@@ -16,18 +17,8 @@ from numpy.typing import NDArray
 
 from guided_lgp.bounds.results import Array
 from guided_lgp.poses import IDENTITY, pose
-from guided_lgp.scene import GRIPPERS, Scene
-from guided_lgp.scene.pr2 import (
-    ARM_JOINTS,
-    ARM_LINKS,
-    CONTINUOUS,
-    FINGER_JOINTS,
-    HAND_LINKS,
-    TOOL_LINK,
-    base_pose,
-    disabled_pairs,
-    urdf_path,
-)
+from guided_lgp.robots import Arm
+from guided_lgp.scene import Scene
 from guided_lgp.scene.world import TABLE_THICKNESS
 
 PADDING = 0.003
@@ -39,7 +30,7 @@ class PlanningScene:
     """What is where, and what may touch, while one arm moves."""
 
     gripper: str
-    """Whose arm moves; the other one stands still."""
+    """Whose arm moves; the others stand still."""
     standing: Mapping[str, Array]
     """World pose (7,) of every box that no gripper carries."""
     carried: Mapping[str, tuple[str, Array]] = field(default_factory=dict)
@@ -52,11 +43,12 @@ class CollisionChecker:
     """Checks configurations of the robot in one scene; a planning scene says which move."""
 
     def __init__(self, scene: Scene) -> None:
-        self._model = pin.buildModelFromUrdf(str(urdf_path()))
-        base = pin.XYZQUATToSE3(base_pose(scene))
+        robot = scene.robot.description
+        self._model = pin.buildModelFromUrdf(str(robot.urdf))
+        base = pin.XYZQUATToSE3(scene.robot.base_pose)
         self._geometry = pin.GeometryModel()
         self._names: list[str] = []
-        for body, shape in _robot_bodies():
+        for body, shape in _robot_bodies(robot.urdf):
             placement = base * body.placement if body.parentJoint == 0 else body.placement
             self._add(body.name[: body.name.rindex("_")], body.parentJoint, placement, shape)
         for joint in range(1, self._model.njoints):
@@ -73,18 +65,15 @@ class CollisionChecker:
             self._add(table.name, 0, pin.XYZQUATToSE3(centre), coal.Box(*sides))
         for box in scene.boxes:
             self._add(box.name, 0, pin.XYZQUATToSE3(IDENTITY), coal.Box(*box.size))
-        self._index = {name: i for i, name in enumerate(self._names)}
-        self._bodies: dict[str, Any] = {
-            **self._index,
-            **{gripper: [self._index[n] for n in HAND_LINKS[gripper]] for gripper in GRIPPERS},
-        }
-        self._arm = {
-            gripper: [self._index[n] for n in ARM_LINKS[gripper] + HAND_LINKS[gripper]]
-            for gripper in GRIPPERS
-        }
-        tool = {g: self._model.frames[self._model.getFrameId(TOOL_LINK[g])] for g in GRIPPERS}
-        self._tool = {g: (frame.parentJoint, frame.placement) for g, frame in tool.items()}
-        self._candidates = self._candidate_pairs(len(scene.tables) + len(scene.boxes))
+        self._bodies: dict[str, list[int]] = {}
+        for number, name in enumerate(self._names):
+            self._bodies.setdefault(name, []).append(number)
+        self._arm = {g: self._shapes(*arm.links, *arm.hand_links) for g, arm in robot.arms.items()}
+        self._bodies |= {g: self._shapes(*arm.hand_links) for g, arm in robot.arms.items()}
+        self._tool = {gripper: self._tool_frame(arm) for gripper, arm in robot.arms.items()}
+        self._candidates = self._candidate_pairs(
+            len(scene.tables) + len(scene.boxes), robot.disabled_pairs
+        )
         self._pairs = np.nonzero(np.triu(self._candidates, 1))
         for first, second in zip(*self._pairs, strict=True):
             self._geometry.addCollisionPair(pin.CollisionPair(int(first), int(second)))
@@ -99,17 +88,23 @@ class CollisionChecker:
         self.queries = 0
         """Calls of :meth:`first_collision` so far."""
         self._template = pin.neutral(self._model)
-        self._template[self._coordinate("torso_lift_joint")] = scene.robot.torso
-        self._plain = [i for i in range(14) if i not in CONTINUOUS]
-        self._plain_at = [self._coordinate(ARM_JOINTS[i]) for i in self._plain]
-        self._cosine_at = [self._coordinate(ARM_JOINTS[i]) for i in CONTINUOUS]
+        for name, value in scene.robot.fixed_values.items():
+            self._template[self._coordinate(name)] = value
+        turning = list(robot.continuous)
+        self._turning = turning
+        self._plain = [i for i in range(len(robot.joint_names)) if i not in turning]
+        at = [self._coordinate(joint) for joint in robot.joint_names]
+        self._plain_at = [at[i] for i in self._plain]
+        self._cosine_at = [at[i] for i in turning]
         self._sine_at = [index + 1 for index in self._cosine_at]
         self._velocity_at = [
-            int(self._model.joints[self._model.getJointId(joint)].idx_v) for joint in ARM_JOINTS
+            int(self._model.joints[self._model.getJointId(joint)].idx_v)
+            for joint in robot.joint_names
         ]
+        self._fingers = {gripper: arm.fingers for gripper, arm in robot.arms.items()}
         self._finger_at = {
-            gripper: [self._coordinate(joint) for joint in FINGER_JOINTS[gripper]]
-            for gripper in GRIPPERS
+            gripper: [self._coordinate(joint) for joint in fingers.joints]
+            for gripper, fingers in self._fingers.items()
         }
 
     def enter(self, scene: PlanningScene) -> None:
@@ -121,7 +116,7 @@ class CollisionChecker:
             joint, tool = self._tool[gripper]
             self._move(box, joint, tool * pin.XYZQUATToSE3(grasp))
             if gripper == scene.gripper:
-                moving.append(self._index[box])
+                moving += self._bodies[box]
         moves = np.zeros(len(self._names), dtype=bool)
         moves[moving] = True
         active = self._candidates & (moves[:, None] | moves[None, :])
@@ -130,22 +125,22 @@ class CollisionChecker:
             active[body, carried] = False
         for one, other in scene.touching:
             first, second = self._bodies[one], self._bodies[other]
-            active[first, second] = active[second, first] = False
+            active[np.ix_(first, second)] = active[np.ix_(second, first)] = False
         self._geometry_data.setActiveCollisionPairs(self._geometry, active, True)
         self._active = np.flatnonzero(active[self._pairs]).tolist()
 
     def coordinates(self, q: Array, fingers: Mapping[str, float]) -> Array:
-        """Coordinates of the pinocchio model (n, nq) for configurations (n, 14)."""
+        """Coordinates of the pinocchio model (m, nq) for configurations (m, n)."""
         full = np.tile(self._template, (len(q), 1))
         full[:, self._plain_at] = q[:, self._plain]
-        full[:, self._cosine_at] = np.cos(q[:, CONTINUOUS])
-        full[:, self._sine_at] = np.sin(q[:, CONTINUOUS])
+        full[:, self._cosine_at] = np.cos(q[:, self._turning])
+        full[:, self._sine_at] = np.sin(q[:, self._turning])
         for gripper, value in fingers.items():
-            full[:, self._finger_at[gripper]] = value
+            full[:, self._finger_at[gripper]] = value * self._fingers[gripper].ratios
         return full
 
     def first_collision(self, q: Array, fingers: Mapping[str, float]) -> tuple[str, str] | None:
-        """The first pair of bodies found in collision along configurations (n, 14), if any.
+        """The first pair of bodies found in collision along configurations (m, n), if any.
 
         The configurations are visited from coarse to fine: ends, middle, quarters, …
         """
@@ -163,15 +158,15 @@ class CollisionChecker:
         """The smallest distances of pairs of bodies, to first order.
 
         Args:
-            q: (n, 14) rad.
+            q: (m, n) rad.
             fingers: value (rad) of the finger joints by gripper.
             count: how many pairs per configuration.
 
         Returns:
-            distances (n, count) in m, negative where bodies penetrate, and their gradients
-            (n, count, 14) in m/rad.
+            distances (m, count) in m, negative where bodies penetrate, and their gradients
+            (m, count, n) in m/rad.
         """
-        values, gradients = np.empty((len(q), count)), np.empty((len(q), count, 14))
+        values, gradients = np.empty((len(q), count)), np.empty((len(q), count, q.shape[1]))
         for row, coordinates in enumerate(self.coordinates(q, fingers)):
             pin.computeJointJacobians(self._model, self._data, coordinates)
             pin.computeDistances(
@@ -189,7 +184,7 @@ class CollisionChecker:
         return values, gradients
 
     def _gradient(self, pair: int) -> Array:
-        """Derivative (14,) of the distance of a pair of bodies, at their nearest points."""
+        """Derivative (n,) of the distance of a pair of bodies, at their nearest points."""
         result = self._geometry_data.distanceResults[pair]
         bodies = self._geometry.collisionPairs[pair]
         rates = []
@@ -210,30 +205,41 @@ class CollisionChecker:
         self._names.append(name)
 
     def _move(self, name: str, joint: int, placement: Any) -> None:
-        body = self._geometry.geometryObjects[self._index[name]]
+        (number,) = self._bodies[name]
+        body = self._geometry.geometryObjects[number]
         body.parentJoint = joint
         body.placement = placement
+
+    def _shapes(self, *links: str) -> list[int]:
+        """The collision shapes of links; a link may have any number of them."""
+        return [number for link in links for number in self._bodies.get(link, ())]
+
+    def _tool_frame(self, arm: Arm) -> tuple[int, Any]:
+        """The joint that a tool frame moves with, and its placement there."""
+        frame = self._model.frames[self._model.getFrameId(arm.tool_link)]
+        return frame.parentJoint, frame.placement * pin.XYZQUATToSE3(arm.tool_in_link)
 
     def _coordinate(self, joint: str) -> int:
         return int(self._model.joints[self._model.getJointId(joint)].idx_q)
 
-    def _candidate_pairs(self, objects: int) -> NDArray[np.bool_]:
+    def _candidate_pairs(
+        self, objects: int, disabled: frozenset[frozenset[str]]
+    ) -> NDArray[np.bool_]:
         """Pairs that can ever be checked: not the SRDF's, nor bodies of one link."""
         joints = np.array([body.parentJoint for body in self._geometry.geometryObjects])
         pairs = joints[:, None] != joints[None, :]
         pairs[-objects:] = pairs[:, -objects:] = True
-        for one, other in map(tuple, disabled_pairs()):
-            if one in self._index and other in self._index:
-                first, second = self._index[one], self._index[other]
-                pairs[first, second] = pairs[second, first] = False
+        for one, other in map(tuple, disabled):
+            first, second = self._shapes(one), self._shapes(other)
+            pairs[np.ix_(first, second)] = pairs[np.ix_(second, first)] = False
         return np.asarray(pairs)
 
 
 @cache
-def _robot_bodies() -> tuple[tuple[Any, Any], ...]:
-    """Geometry object and convex shape of every link with a collision geometry."""
-    model = pin.buildModelFromUrdf(str(urdf_path()))
-    geometry = pin.buildGeomFromUrdf(model, str(urdf_path()), pin.GeometryType.COLLISION)
+def _robot_bodies(urdf: Path) -> tuple[tuple[Any, Any], ...]:
+    """Geometry object and convex shape of every collision geometry of a robot's links."""
+    model = pin.buildModelFromUrdf(str(urdf))
+    geometry = pin.buildGeomFromUrdf(model, str(urdf), pin.GeometryType.COLLISION)
     bodies = []
     for body in geometry.geometryObjects:
         shape = body.geometry

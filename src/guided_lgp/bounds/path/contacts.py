@@ -13,7 +13,6 @@ from guided_lgp.bounds.path.situation import Situation
 from guided_lgp.bounds.path.task import Task
 from guided_lgp.bounds.results import Array
 from guided_lgp.poses import compose, inverse, rotation_matrix
-from guided_lgp.scene.pr2 import arm_slice
 
 
 @dataclass(frozen=True)
@@ -48,8 +47,9 @@ class ContactSampler:
 
     def _grips(self, index: int, situation: Situation) -> Iterator[Contacts]:
         """All ways to hold the body, for one strategy of its next action after the other."""
-        body = self._task.manoeuvres[index].body
-        central, others = self._task.grips[body]
+        action = self._task.manoeuvres[index]
+        body = action.body
+        central, others = self._task.grips[action.parent, body]
         box = situation.boxes(self._task.arms)[body]
         for strategy, grips in product(STRATEGIES, (central + self._coarse_grip(index), others)):
             outlook = self._foresight.outlook(index, situation, grips, strategy)
@@ -63,9 +63,8 @@ class ContactSampler:
         """The coarse solution's own grip."""
         action, contact = self._task.manoeuvres[index], self._task.contacts[index]
         box = contact.boxes[action.body]
-        rotation, position = self._task.arms[action.parent].forward(
-            contact.q[arm_slice(action.parent)]
-        )
+        arm = self._task.arms[action.parent]
+        rotation, position = arm.forward(contact.q[arm.arm.slice])
         frame = rotation_matrix(box[3:])
         return Grips((frame.T @ rotation)[None], ((position - box[:3]) @ frame)[None])
 

@@ -10,10 +10,9 @@ from guided_lgp.bounds.path.grips import Grips
 from guided_lgp.bounds.path.placing import STRATEGIES, Place, PlacementSampler, PlaceStrategy
 from guided_lgp.bounds.path.situation import Fingers, Situation, matrix_pose
 from guided_lgp.bounds.path.steps import Way
-from guided_lgp.bounds.path.task import PAN_SHIFTS, Reach, Stage, Task
+from guided_lgp.bounds.path.task import Reach, Stage, Task
 from guided_lgp.bounds.results import Array
 from guided_lgp.poses import compose, inverse, rotation_matrix
-from guided_lgp.scene.pr2 import FINGER_LIMITS
 
 _FORESEEN = 10
 """Configurations at the later contact that are looked at per grip."""
@@ -94,7 +93,7 @@ class Foresight:
             if box not in away
         }
         closing = action.closing
-        opened = {} if closing is None else {closing: FINGER_LIMITS[1]}
+        opened = {} if closing is None else {closing: task.opened(closing)}
         fingers = {**situation.fingers, **opened}
         return Situation(task.states[later], contact.q, fingers, standing, {})
 
@@ -116,8 +115,8 @@ class Foresight:
         cost = np.full_like(reach.cost, np.inf)
         cost[grip::count] = reach.cost[grip::count]
         for choice in replace(reach, cost=cost).order()[:_FORESEEN]:
-            number, pan, side = choice
-            ends = reach.q[number, :, pan, side]
+            number, value, branch = choice
+            ends = reach.q[number, :, value, branch]
             if task.blocked(later, Stage.CONTACT, "at the contact", around, ends):
                 continue
             left = self._left(later, expected, targets[number // count].pose)
@@ -141,7 +140,7 @@ class Foresight:
     def _left(self, later: int, expected: Situation, target: Array) -> Situation:
         """When the body has been let go of."""
         body, opening = self._task.manoeuvres[later].body, self._task.manoeuvres[later].opening
-        opened = [] if opening is None else [Fingers(opening, FINGER_LIMITS[1])]
+        opened = [] if opening is None else [Fingers(opening, self._task.opened(opening))]
         return replace(
             self._task.after(expected, opened),
             standing={**expected.standing, body: target},
@@ -152,17 +151,19 @@ class Foresight:
         self, later: int, holder: str, left: Situation, reach: Reach, choice: tuple[int, int, int]
     ) -> bool:
         """Whether the hand, where it is the one that leaves, has a free end of its way out."""
-        task, (number, pan, side) = self._task, choice
+        task, (number, value, branch) = self._task, choice
         way_out = task.manoeuvres[later].way_out
         if way_out.gripper != holder:
             return True
         rotation, contact = reach.rotation[number], reach.contact[number]
         ends = np.array([contact + way.of(rotation) for way in way_out.ways])[:, None]
-        q, valid = task.arms[holder].inverse(rotation, ends, reach.pans[pan] + np.array(PAN_SHIFTS))
-        if not valid[..., side].any():
+        q, valid = task.arms[holder].inverse(
+            rotation, ends, reach.redundancies[value] + np.array(task.shifts(holder))
+        )
+        if not valid[..., branch].any():
             task.record(later, Stage.OFF, "way out out of reach")
         around = left.around(holder)
         return not all(
             task.blocked(later, Stage.LEFT, "after the contact", around, end[None])
-            for end in q[..., side, :][valid[..., side]]
+            for end in q[..., branch, :][valid[..., branch]]
         )

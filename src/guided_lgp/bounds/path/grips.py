@@ -6,8 +6,9 @@ from itertools import product
 import numpy as np
 
 from guided_lgp.bounds.results import Array
+from guided_lgp.robots import Arm
 from guided_lgp.scene import Box
-from guided_lgp.scene.pr2 import FINGER_LIMITS, PALM_FRONT, finger_opening, grasp_axis
+from guided_lgp.scene.pr2 import grasp_axis
 
 PALM_GAP = 0.002
 """Distance (m) of the palm's front from the box, at least."""
@@ -44,10 +45,10 @@ class Grips:
         return rotation @ self.rotation, position + self.offset @ rotation.T
 
 
-def grips_of(box: Box) -> tuple[Grips, Grips]:
+def grips_of(box: Box, arm: Arm) -> tuple[Grips, Grips]:
     """Grids over pitch × flip of the hand: the deep and centred grips, and all others.
 
-    Both are empty for a box that is too wide.
+    Both are empty for a box that is too wide for the hand.
     """
     half = np.array(box.size) / 2
     across = grasp_axis(box.size)
@@ -55,11 +56,11 @@ def grips_of(box: Box) -> tuple[Grips, Grips]:
     central: list[tuple[Array, Array]] = []
     others: list[tuple[Array, Array]] = []
     pitches = np.pi * np.arange(_PITCHES + 1) / _PITCHES
-    if 2 * half[across] > finger_opening(FINGER_LIMITS[1]):
+    if 2 * half[across] > arm.fingers.widest:
         pitches = pitches[:0]
     for pitch, shift, back, flip in product(pitches, _SHIFTS, _DEPTHS, (1.0, -1.0)):
         approach = np.cos(pitch) * along - np.sin(pitch) * np.array([0.0, 0.0, 1.0])
-        depth = np.abs(approach) @ half + PALM_FRONT + PALM_GAP + back
+        depth = np.abs(approach) @ half + arm.palm_front + PALM_GAP + back
         third = np.cross(approach, closing)
         offset = shift * third - depth * approach
         if np.all(np.abs(offset) <= half - _INSET):

@@ -9,17 +9,16 @@ import numpy as np
 
 from guided_lgp.bounds.path.collision import CollisionChecker, PlanningScene
 from guided_lgp.bounds.path.connect import connect, shortcut
-from guided_lgp.bounds.path.ik import Arm
 from guided_lgp.bounds.path.spaces import (
     JointSpace,
     LevelSpace,
-    continuous_path,
     turned,
     wound,
 )
 from guided_lgp.bounds.path.timing import time_path
 from guided_lgp.bounds.results import Array
-from guided_lgp.scene import GRIPPERS, Scene
+from guided_lgp.robots import Arm, PlacedArm
+from guided_lgp.scene import Scene
 
 LINE_STEP = 0.01
 """Distance (m) of configurations along a straight line."""
@@ -37,7 +36,7 @@ class Surroundings:
 
     scene: PlanningScene
     q: Array
-    """Configuration (14,); the moving arm's part does not matter."""
+    """Configuration (n,); the moving arm's part does not matter."""
     fingers: Mapping[str, float]
     """Value (rad) of the finger joints by gripper."""
 
@@ -59,33 +58,40 @@ class Tool:
     """(3, 3)"""
     position: Array
     """(3,) of the frame's origin (m)."""
-    pan: float
-    """Angle of the pan joint (rad)."""
-    side: int
-    """Of the elbow."""
+    redundancy: float
+    """Value of the redundant joint (rad)."""
+    branch: int
+    """Of the inverse kinematics."""
 
 
 @dataclass(frozen=True)
 class Motion:
     """One arm follows a path from rest to rest."""
 
-    gripper: str
+    arm: Arm
     path: Array
-    """Configurations (n, 7) in rad, for a cubic spline through them."""
+    """Configurations (m, n) in rad, for a cubic spline through them."""
     transit: Transit | None = None
     """None for a straight line, which is where it has to be."""
 
+    @property
+    def gripper(self) -> str:
+        """Whose arm it is."""
+        return self.arm.gripper
+
     @cached_property
     def timed(self) -> tuple[Array, Array]:
-        """Times (T,) in s and configurations (T, 7)."""
-        return time_path(self.path, self.gripper)
+        """Times (T,) in s and configurations (T, n)."""
+        return time_path(self.path, self.arm)
 
 
 class Mover:
     """Plans motions in one scene. Deterministic: every call brings its source of randomness."""
 
     def __init__(self, scene: Scene, iterations: int) -> None:
-        self.arms = {gripper: Arm(scene, gripper) for gripper in GRIPPERS}
+        base, fixed = scene.robot.base_pose, scene.robot.fixed_values
+        self.robot = scene.robot.description
+        self.arms = {g: PlacedArm(self.robot, g, base, fixed) for g in self.robot.grippers}
         self._checker = CollisionChecker(scene)
         self._iterations = iterations
 
@@ -95,12 +101,12 @@ class Mover:
         return self._checker.queries
 
     def collision(self, surroundings: Surroundings, q: Array) -> tuple[str, str] | None:
-        """The first pair of bodies in collision along configurations (n, 7) of the moving arm."""
+        """The first pair of bodies in collision along configurations (m, n) of the moving arm."""
         return self._space(surroundings).collision(q)
 
     def distances(self, surroundings: Surroundings, q: Array, count: int) -> tuple[Array, Array]:
-        """Smallest distances (n, count) in m along configurations (n, 7) of the moving arm, and
-        their gradients (n, count, 7).
+        """Smallest distances (m, count) in m along configurations (m, n) of the moving arm, and
+        their gradients (m, count, n).
         """
         return self._space(surroundings).distances(q, count)
 
@@ -117,18 +123,17 @@ class Mover:
             surroundings: what stands still.
             tool: at the start.
             direction: displacement (3,) of the tool (m).
-            shift: turn of the pan joint (rad) on the way.
+            shift: turn of the redundant joint (rad) on the way.
 
         Returns:
-            Configurations (n, 7), or what is wrong with it.
+            Configurations (m, n), or what is wrong with it.
         """
         arm = self.arms[surroundings.scene.gripper]
         count = 2 + int(np.linalg.norm(direction) / LINE_STEP)
         position = tool.position + np.linspace(0.0, 1.0, count)[:, None] * direction
-        q, valid = arm.inverse(
-            tool.rotation, position, np.linspace(tool.pan, tool.pan + shift, count)
-        )
-        path = continuous_path(q[:, tool.side], valid[:, tool.side])
+        redundancy = np.linspace(tool.redundancy, tool.redundancy + shift, count)
+        q, valid = arm.inverse(tool.rotation, position, redundancy)
+        path = arm.follow(q, valid, tool.branch)
         if path is None:
             return "out of reach"
         rotation, middle = arm.forward((path[:-1] + path[1:]) / 2)
@@ -145,7 +150,7 @@ class Mover:
         """A free motion in joint space: the direct line, or else RRT-Connect and shortcuts.
 
         Returns:
-            Paths (n, 7) with a rest between two of them, or None.
+            Paths (m, n) with a rest between two of them, or None.
         """
         space = self._space(surroundings)
         points = connect(space, start, goal, rng, self._iterations)
@@ -160,7 +165,7 @@ class Mover:
     ) -> list[Array] | None:
         """A free motion on which the hand keeps its tilt: what it holds stays level.
 
-        Both ends must have the elbow on the same side, and the hand at the same tilt.
+        Both ends must be on one branch of the inverse kinematics, and the hand at the same tilt.
         """
         arm = self.arms[surroundings.scene.gripper]
         rotation, position = arm.forward(np.stack([start, goal]))
@@ -168,11 +173,12 @@ class Mover:
         yaw = float(np.arctan2(turn[1, 0], turn[0, 0]))
         if not np.allclose(turned(rotation[0], np.array([yaw]))[0], rotation[1], atol=1e-6):
             return None
-        side = self.side(arm.gripper, start)
-        if self.side(arm.gripper, goal) != side:
+        branch = arm.branch(start)
+        if arm.branch(goal) != branch:
             return None
-        space = LevelSpace(self._space(surroundings), arm, rotation[0], side)
-        ends = np.array([[*position[0], 0.0, start[0]], [*position[1], yaw, goal[0]]])
+        space = LevelSpace(self._space(surroundings), arm, rotation[0], branch)
+        free = arm.redundancy(np.stack([start, goal]))
+        ends = np.array([[*position[0], 0.0, free[0]], [*position[1], yaw, free[1]]])
         points = connect(space, ends[0], ends[1], rng, self._iterations)
         if points is None:
             return None
@@ -182,18 +188,13 @@ class Mover:
         for first, last in pairwise(points):
             path = space.path(first, last)
             assert path is not None  # the planner has followed it
-            paths.append(wound(path, start if not paths else paths[-1][-1]))
+            paths.append(wound(path, arm, start if not paths else paths[-1][-1]))
         return paths
 
     def tool(self, gripper: str, q: Array) -> Tool:
-        """Where the tool is for joints (7,)."""
-        return Tool(*self.arms[gripper].forward(q), float(q[0]), self.side(gripper, q))
-
-    def side(self, gripper: str, q: Array) -> int:
-        """On which side (0 or 1) of the inverse kinematics the elbow is for joints (7,)."""
+        """Where the tool is for joints (n,)."""
         arm = self.arms[gripper]
-        solutions, _ = arm.inverse(*arm.forward(q), q[0])
-        return int(np.argmin(np.abs(np.sin((solutions - q) / 2)).sum(axis=1)))
+        return Tool(*arm.forward(q), float(arm.redundancy(q)), arm.branch(q))
 
     def _space(self, surroundings: Surroundings) -> JointSpace:
         self._checker.enter(surroundings.scene)

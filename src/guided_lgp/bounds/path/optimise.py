@@ -28,14 +28,12 @@ import casadi as ca
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from guided_lgp.bounds.path.ik import REACH, Arm
 from guided_lgp.bounds.path.motions import Motion, Mover, Transit
 from guided_lgp.bounds.path.situation import Step
 from guided_lgp.bounds.path.spaces import STEP
 from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.bounds.results import Array
-from guided_lgp.robots import load_robot
-from guided_lgp.scene.pr2 import JOINT_LIMITS, VELOCITY_LIMITS, arm_slice
+from guided_lgp.robots import Arm, PlacedArm, Robot
 
 WAYPOINTS = 10
 """N, between the ends of a motion."""
@@ -62,8 +60,6 @@ _INSET, _NEAR_LIMIT = 0.02, 0.005
 _FINE = 200
 """Points at which the length of a spline is measured."""
 
-_W: Array = 1.0 / VELOCITY_LIMITS[:7]
-
 
 def optimise(mover: Mover, steps: Iterable[Step]) -> list[Step]:
     """Optimise the free motions of a plan and join them with the straight lines beside them.
@@ -72,10 +68,10 @@ def optimise(mover: Mover, steps: Iterable[Step]) -> list[Step]:
     the optimised ones would not be faster.
     """
     result: list[Step] = []
-    for gripper, group in groupby(steps, key=lambda s: s.gripper if isinstance(s, Motion) else ""):
+    for _, group in groupby(steps, key=lambda s: s.gripper if isinstance(s, Motion) else ""):
         run = list(group)
         motions = [step for step in run if isinstance(step, Motion)]
-        faster = _joined(mover, gripper, motions)
+        faster = _joined(mover, motions)
         result += faster if _duration(faster) < _duration(motions) else run
     return result
 
@@ -84,7 +80,7 @@ def _duration(motions: Sequence[Motion]) -> float:
     return sum(float(motion.timed[0][-1]) for motion in motions)
 
 
-def _joined(mover: Mover, gripper: str, motions: Sequence[Motion]) -> list[Motion]:
+def _joined(mover: Mover, motions: Sequence[Motion]) -> list[Motion]:
     """The free motions optimised, those that succeed joined with the lines before and after."""
     pieces = [list(piece) for _, piece in groupby(motions, key=_freedom)]
     paths = [np.concatenate([p[0].path, *(m.path[1:] for m in p[1:])]) for p in pieces]
@@ -97,10 +93,10 @@ def _joined(mover: Mover, gripper: str, motions: Sequence[Motion]) -> list[Motio
             optimised |= {} if path is None else {i: path}
     result: list[Motion] = []
     for i, piece in enumerate(pieces):
-        new = [Motion(gripper, optimised[i])] if i in optimised else piece
+        new = [Motion(piece[0].arm, optimised[i])] if i in optimised else piece
         if (i in optimised and i - 1 in lines) or (i in lines and i - 1 in optimised):
             new = [
-                Motion(gripper, np.concatenate([result.pop().path, new[0].path[1:]])),
+                Motion(piece[0].arm, np.concatenate([result.pop().path, new[0].path[1:]])),
                 *new[1:],
             ]
         result += new
@@ -118,7 +114,7 @@ def _freedom(motion: Motion) -> bool | None:
 def _optimised(
     mover: Mover, transit: Transit, path: Array, before: Array | None, after: Array | None
 ) -> Array | None:
-    """The best free spline (n, 7) between the ends of a path, or None.
+    """The best free spline (m, n) between the ends of a path, or None.
 
     The first round has no constraints but the joint limits: most motions are then done. The
     others start again from the path, in steps for which the linearisation holds.
@@ -126,29 +122,31 @@ def _optimised(
     Args:
         mover: checks it.
         transit: what it must keep clear of, and whether it is level.
-        path: (n, 7) from which to start.
+        path: (m, n) from which to start.
         before: the straight line that leads to its first configuration, if there is one.
         after: the one that begins at its last.
     """
-    lengths = np.linalg.norm(np.diff(path, axis=0) * _W, axis=1)
+    placed = mover.arms[transit.surroundings.scene.gripper]
+    arm = placed.arm
+    lengths = np.linalg.norm(np.diff(path, axis=0) * _weights(arm), axis=1)
     s = np.concatenate([[0.0], np.cumsum(lengths)])
     if s[-1] < _SHORTEST:
         return None
     spline = _Spline(
         np.linspace(0.0, s[-1], WAYPOINTS + 2),
-        None if before is None else _direction(before[-2], before[-1]),
-        None if after is None else _direction(after[0], after[1]),
+        None if before is None else _direction(arm, before[-2], before[-1]),
+        None if after is None else _direction(arm, after[0], after[1]),
+        arm.reaches,
     )
     points = np.stack([np.interp(spline.knots, s, joint) for joint in path.T], axis=1)
-    arm = mover.arms[transit.surroundings.scene.gripper]
-    vertical = arm.forward(path[0])[0][2] if transit.keep_level else None
-    limits = JOINT_LIMITS[arm_slice(arm.gripper)]
+    vertical = placed.forward(path[0])[0][2] if transit.keep_level else None
+    limits, program = arm.limits, quadratic_program(mover.robot, arm.mirror_of or arm.gripper)
     best: Array | None = None
     for number in range(ROUNDS):
         linearised = transit.keep_level or number > 0
         last, inner = points, points[1:-1]
         near = mover.distances(transit.surroundings, inner, NEIGHBOURS) if linearised else None
-        found = _round(spline, last, near, arm.sign, vertical, limits)
+        found = _round(program, spline, last, near, arm, vertical)
         if found is None:
             break
         moved = np.concatenate([last[:1], found, last[-1:]])
@@ -157,7 +155,7 @@ def _optimised(
             np.all(
                 (candidate > limits[:, 0] + _NEAR_LIMIT) & (candidate < limits[:, 1] - _NEAR_LIMIT)
             )
-            and (vertical is None or _turned(arm, candidate, vertical) < LEVEL)
+            and (vertical is None or _turned(placed, candidate, vertical) < LEVEL)
             and mover.collision(transit.surroundings, candidate) is None
         )
         if clear:
@@ -168,13 +166,18 @@ def _optimised(
     return best
 
 
-def _direction(start: Array, end: Array) -> Array:
+def _weights(arm: Arm) -> Array:
+    """W (n,) in s/rad."""
+    return 1.0 / arm.velocity_limits
+
+
+def _direction(arm: Arm, start: Array, end: Array) -> Array:
     """Of a line in joint space; its length is 1 s at full speed."""
-    return np.asarray((end - start) / np.linalg.norm((end - start) * _W))
+    return np.asarray((end - start) / np.linalg.norm((end - start) * _weights(arm)))
 
 
-def _turned(arm: Arm, path: Array, vertical: Array) -> float:
-    """How far the vertical turns in the tool frame along a path (n, 7)."""
+def _turned(arm: PlacedArm, path: Array, vertical: Array) -> float:
+    """How far the vertical turns in the tool frame along a path (m, n)."""
     return float(np.abs(arm.forward(path)[0][:, 2] - vertical).max())
 
 
@@ -185,17 +188,19 @@ class _Spline:
     knots: Array
     """(WAYPOINTS + 2,) s at full speed."""
     out: Array | None
-    """Derivative (7,) at the start; None where the motion begins at rest."""
+    """Derivative (n,) at the start; None where the motion begins at rest."""
     into: Array | None
     """The same for the end."""
+    reaches: Array
+    """(n,) m per rad."""
 
     def sampled(self, points: Array) -> Array:
-        """Through (WAYPOINTS + 2, 7), at steps that are short enough for collision checks."""
+        """Through (WAYPOINTS + 2, n), at steps that are short enough for collision checks."""
         rest = (2, np.zeros(points.shape[1]))
         ends = (rest if slope is None else (1, slope) for slope in (self.out, self.into))
         curve = CubicSpline(self.knots, points, bc_type=tuple(ends))
         fine = np.linspace(0.0, self.knots[-1], _FINE)
-        ways = np.sum(np.abs(np.diff(curve(fine), axis=0)) * REACH, axis=1)
+        ways = np.sum(np.abs(np.diff(curve(fine), axis=0)) * self.reaches, axis=1)
         way = np.concatenate([[0.0], np.cumsum(ways)])
         marks = np.linspace(0.0, way[-1], 2 + int(way[-1] / STEP))
         path = np.asarray(curve(np.interp(marks, way, fine)))
@@ -204,32 +209,32 @@ class _Spline:
 
 
 def _round(
+    program: Any,
     spline: _Spline,
     last: Array,
     near: tuple[Array, Array] | None,
-    sign: Array,
+    arm: Arm,
     vertical: Array | None,
-    limits: Array,
 ) -> Array | None:
     """Solve the quadratic program of one round.
 
     Args:
+        program: the quadratic program of the arm.
         spline: its knots and the slopes at its ends.
-        last: the iterate (WAYPOINTS + 2, 7) with both ends.
-        near: distances (WAYPOINTS, NEIGHBOURS) and gradients (..., 7); None to leave them out,
+        last: the iterate (WAYPOINTS + 2, n) with both ends.
+        near: distances (WAYPOINTS, NEIGHBOURS) and gradients (..., n); None to leave them out,
             and the trust region with them.
-        sign: (7,) of the joints, to mirror a right arm.
+        arm: whose motion it is; a mirror image is solved as the original.
         vertical: (3,) in the tool frame, where it is to be kept.
-        limits: (7, 2) of the joints.
 
     Returns:
-        the next waypoints (WAYPOINTS, 7), or None if the solver fails.
+        the next waypoints (WAYPOINTS, n), or None if the solver fails.
     """
-    h = float(spline.knots[1])
+    h, sign, limits = float(spline.knots[1]), arm.signs, arm.limits
     inner = last[1:-1]
     low = np.full_like(inner, limits[:, 0] + _INSET)
     high = np.full_like(inner, limits[:, 1] - _INSET)
-    gradients = np.zeros((WAYPOINTS, NEIGHBOURS, 7))
+    gradients = np.zeros((WAYPOINTS, NEIGHBOURS, len(sign)))
     least = np.full((WAYPOINTS, NEIGHBOURS), -np.inf)
     if near is not None:
         distances, gradients = near
@@ -238,42 +243,47 @@ def _round(
     before = last[0] if spline.out is None else last[0] - h * spline.out
     after = last[-1] if spline.into is None else last[-1] + h * spline.into
     flags = [spline.out is not None, spline.into is not None, vertical is not None]
-    upright = np.zeros(3) if vertical is None else vertical * (1.0, sign[0], 1.0)
+    upright = (
+        np.zeros(3)
+        if vertical is None
+        else vertical * (1.0, 1.0 if arm.mirror_of is None else -1.0, 1.0)
+    )
     rows = (*last * sign, before * sign, after * sign, (gradients * sign).ravel())
     bounds = np.sort(np.stack([low * sign, high * sign]), axis=0).reshape(2, -1)
     slack = np.full(WAYPOINTS, np.inf)
-    solver = quadratic_program()
-    solution = solver(
+    solution = program(
         p=np.concatenate([*rows, upright, flags, [h]]),
         lbx=np.concatenate([bounds[0], -slack]),
         ubx=np.concatenate([bounds[1], slack]),
         lbg=least.ravel(),
     )
-    if not solver.stats()["success"]:
+    if not program.stats()["success"]:
         return None
     return np.asarray(solution["x"])[: inner.size, 0].reshape(inner.shape) * sign
 
 
 @cache
-def quadratic_program() -> Any:
-    """The program of one round for a left arm (right arms are mirrored), derived by CasADi."""
-    q, slack = ca.SX.sym("q", 7, WAYPOINTS), ca.SX.sym("slack", WAYPOINTS)
-    last = ca.SX.sym("last", 7, WAYPOINTS + 2)
-    before, after = ca.SX.sym("before", 7), ca.SX.sym("after", 7)
-    gradients = ca.SX.sym("gradients", 7, WAYPOINTS * NEIGHBOURS)
+def quadratic_program(robot: Robot, gripper: str) -> Any:
+    """The program of one round for an arm, or the mirror image of one, derived by CasADi."""
+    arm = robot.arms[gripper]
+    n = len(arm.joints)
+    q, slack = ca.SX.sym("q", n, WAYPOINTS), ca.SX.sym("slack", WAYPOINTS)
+    last = ca.SX.sym("last", n, WAYPOINTS + 2)
+    before, after = ca.SX.sym("before", n), ca.SX.sym("after", n)
+    gradients = ca.SX.sym("gradients", n, WAYPOINTS * NEIGHBOURS)
     vertical = ca.SX.sym("vertical", 3)
     leaves, enters, level, h = (ca.SX.sym(name) for name in ("leaves", "enters", "level", "h"))
     points = ca.horzcat(last[:, 0], q, last[:, -1])
-    weights = ca.diag(ca.SX(_W))
+    weights = ca.diag(ca.SX(_weights(arm)))
     steps = weights @ (points[:, 1:] - points[:, :-1])
     bends = steps[:, 1:] - steps[:, :-1]
     first = steps[:, 0] - weights @ (last[:, 0] - before)
     final = weights @ (after - last[:, -1]) - steps[:, -1]
     smoothness = ca.sumsqr(bends) + leaves * ca.sumsqr(first) + enters * ca.sumsqr(final)
     cost = ca.sumsqr(steps) / h + _TAU**2 * smoothness / h**3 + _SLACK_WEIGHT * ca.sumsqr(slack)
-    angles = ca.SX.sym("angles", 7)
-    (chain,) = kinematics_of(load_robot("pr2")).chains
-    up = chain.pose(angles, 1, (0,)).rotation[2, :].T
+    angles = ca.SX.sym("angles", n)
+    chain = kinematics_of(robot).arms[gripper].chain
+    up = chain.pose(angles, 1, (0,) * len(chain.fixed)).rotation[2, :].T
     tilt = ca.Function("tilt", [angles], [up, ca.jacobian(up, angles)])
     for i in range(WAYPOINTS):
         now, change = tilt(last[:, i + 1])

@@ -11,14 +11,12 @@ from itertools import islice, product
 import numpy as np
 
 from guided_lgp.bounds.path.contacts import Contacts, ContactSampler
-from guided_lgp.bounds.path.ik import continuous_near
 from guided_lgp.bounds.path.motions import Motion, Tool
 from guided_lgp.bounds.path.situation import Attach, Fingers, Release, Situation, Step
 from guided_lgp.bounds.path.spaces import wound
-from guided_lgp.bounds.path.task import PAN_SHIFTS, Choice, Outcome, Reach, Stage, Task
+from guided_lgp.bounds.path.task import Choice, Outcome, Reach, Stage, Task
 from guided_lgp.bounds.results import Array
 from guided_lgp.poses import compose, inverse, pose, rotation_matrix, yaw_of
-from guided_lgp.scene.pr2 import FINGER_LIMITS, arm_slice, finger_joint
 
 _OUTCOMES = 4
 """Ways to carry out an action that are passed on, before an earlier action is changed."""
@@ -98,13 +96,14 @@ class OutcomeSampler:
         tool = compose(
             _upright(task.contacts[index].boxes[root]), inverse(situation.carried[root][1])
         )
+        arm = task.arms[holder]
         rotation, nowhere = rotation_matrix(tool[3:])[None], np.zeros((1, 3))
-        reach = task.reach(index, task.arms[holder], rotation, tool[None, :3], nowhere)
+        reach = task.reach(index, arm, rotation, tool[None, :3], nowhere)
         if loaded:
             reach = task.level_reach(reach, holder, situation)
-        now, around = situation.q[arm_slice(holder)], situation.around(holder)
-        for _, pan, side in reach.order()[: 2 * _ELBOWS]:
-            goal = continuous_near(reach.q[0, 0, pan, side], now)
+        now, around = situation.q[arm.arm.slice], situation.around(holder)
+        for _, value, branch in reach.order()[: 2 * _ELBOWS]:
+            goal = arm.near(reach.q[0, 0, value, branch], now)
             if task.blocked(index, Stage.REACH, "presenting", around, goal[None]):
                 continue
             steps = task.transit(around, now, goal, loaded)
@@ -115,9 +114,9 @@ class OutcomeSampler:
 
     def _opening(self, situation: Situation, gripper: str | None) -> tuple[Step, ...]:
         """Fingers that are to close open before."""
-        if gripper is None or situation.fingers[gripper] == FINGER_LIMITS[1]:
+        if gripper is None or situation.fingers[gripper] == self._task.opened(gripper):
             return ()
-        return (Fingers(gripper, FINGER_LIMITS[1]),)
+        return (Fingers(gripper, self._task.opened(gripper)),)
 
     def _carried_out(self, index: int, situation: Situation) -> Iterator[Outcome]:
         """Carry out an action at the likeliest contacts that are within reach."""
@@ -143,10 +142,10 @@ class OutcomeSampler:
         off = situation.around(action.gripper)
         attempts = np.zeros(len(reach.cost), dtype=int)
         for choice in reach.order(contacts.cost)[:_CONFIGURATIONS]:
-            number, pan, side = choice
+            number, value, branch = choice
             if attempts[number] >= _ELBOWS:
                 continue
-            contact, before = reach.q[number, :, None, pan, side]
+            contact, before = reach.q[number, :, None, value, branch]
             if task.blocked(index, Stage.CONTACT, "at the contact", at, contact):
                 continue
             if task.blocked(index, Stage.OFF, "before the contact", off, before):
@@ -164,29 +163,30 @@ class OutcomeSampler:
     ) -> Outcome | None:
         """Plan all motions of an action from one configuration, straight lines first."""
         task, action = self._task, self._task.manoeuvres[index]
-        gripper, leaving = action.gripper, action.way_out.gripper
-        start, tool = situation.q[arm_slice(gripper)], reach.tool(choice)
+        gripper, arm = action.gripper, task.arms[action.gripper]
+        leaving = task.arms[action.way_out.gripper]
+        start, tool = situation.q[arm.arm.slice], reach.tool(choice)
         around = situation.around(gripper, [(action.body, action.parent)])
         line = task.mover.line(around, tool, reach.way[choice[0]])
         if isinstance(line, str):
             task.record(index, Stage.LINE_IN, f"{line} on the way in")
             return None
         # Full turns of a joint move the hand in the last bit only, but what is let go of keeps it.
-        at = line[::-1] if action.body in situation.carried else wound(line[::-1], start)
-        reached = task.after(situation, [Motion(gripper, at)])
+        at = line[::-1] if action.body in situation.carried else wound(line[::-1], arm, start)
+        reached = task.after(situation, [Motion(arm.arm, at)])
         switch = self._switch(index, reached)
         switched = replace(task.after(reached, switch), state=task.states[index + 1])
-        if leaving != gripper:
-            tool = task.mover.tool(leaving, switched.q[arm_slice(leaving)])
+        if leaving != arm:
+            tool = task.mover.tool(leaving.gripper, switched.q[leaving.arm.slice])
         for out in self._ways_out(index, switched, tool):
-            goal = continuous_near(line[-1], start)
+            goal = arm.near(line[-1], start)
             come = task.transit(situation.around(gripper), start, goal, situation.loaded(gripper))
             if come is None:
                 task.record(index, Stage.TRANSIT, f"no motion found to {action.name} {action.body}")
                 return None
-            inward = Motion(gripper, wound(line[::-1], come[-1].path[-1]))
+            inward = Motion(arm.arm, wound(line[::-1], arm, come[-1].path[-1]))
             left = task.after(switched, [inward])
-            outward = Motion(leaving, wound(out, left.q[arm_slice(leaving)]))
+            outward = Motion(leaving.arm, wound(out, leaving, left.q[leaving.arm.slice]))
             left = task.after(left, [outward])
             go = self._home(index, Stage.HOME, left, action.homes)
             if go is not None:
@@ -199,7 +199,7 @@ class OutcomeSampler:
         task, action = self._task, self._task.manoeuvres[index]
         around = switched.around(action.way_out.gripper, [(action.body, self._parent(index))])
         at_end = switched.around(action.way_out.gripper)
-        for way, shift in product(action.way_out.ways, PAN_SHIFTS):
+        for way, shift in product(action.way_out.ways, task.shifts(action.way_out.gripper)):
             out = task.mover.line(around, tool, way.of(tool.rotation), shift)
             if isinstance(out, str):
                 task.record(index, Stage.LINE_OUT, f"{out} on the way out")
@@ -214,14 +214,15 @@ class OutcomeSampler:
         carrier = task.carrier(index + 1, action.body)
         steps: list[Step] = []
         if action.closing is not None:
-            width = min(task.boxes[action.body].size[:2])
-            steps.append(Fingers(action.closing, finger_joint(width)))
+            fingers = task.arms[action.closing].arm.fingers
+            closed = fingers.value(min(task.boxes[action.body].size[:2]))
+            steps.append(Fingers(action.closing, closed))
         if action.body in situation.carried:
             steps.append(Release(bodies))
         if carrier is not None:
             steps.append(Attach(bodies, carrier))
         if action.opening is not None:
-            steps.append(Fingers(action.opening, FINGER_LIMITS[1]))
+            steps.append(Fingers(action.opening, task.opened(action.opening)))
         return tuple(steps)
 
     def _home(

@@ -7,17 +7,16 @@ import numpy as np
 import pinocchio as pin
 
 from guided_lgp.bounds.path.collision import PlanningScene
-from guided_lgp.bounds.path.ik import Arm
 from guided_lgp.bounds.path.motions import Motion, Surroundings
 from guided_lgp.bounds.results import Array, Keyframe
 from guided_lgp.logic import State
 from guided_lgp.poses import compose, inverse
-from guided_lgp.scene.pr2 import arm_slice
+from guided_lgp.robots import PlacedArm
 
 
 @dataclass(frozen=True)
 class Fingers:
-    """A gripper opens or closes its fingers to a value of the finger joints (rad)."""
+    """A gripper opens or closes its fingers to a value of the finger joints (rad, or m)."""
 
     gripper: str
     value: float
@@ -47,7 +46,7 @@ class Situation:
 
     state: State
     q: Array
-    """Configuration (14,) in rad."""
+    """Configuration (n,) in rad."""
     fingers: Mapping[str, float]
     """Value (rad) of the finger joints by gripper."""
     standing: Mapping[str, Array]
@@ -55,7 +54,7 @@ class Situation:
     carried: Mapping[str, tuple[str, Array]]
     """Gripper, and pose (7,) in its tool frame, of every box held or standing on a held one."""
 
-    def boxes(self, arms: Mapping[str, Arm]) -> dict[str, Array]:
+    def boxes(self, arms: Mapping[str, PlacedArm]) -> dict[str, Array]:
         """World pose (7,) of every box."""
         carriers = sorted({gripper for gripper, _ in self.carried.values()})
         tools = {gripper: tool_pose(arms[gripper], self.q) for gripper in carriers}
@@ -75,12 +74,12 @@ class Situation:
         scene = PlanningScene(gripper, self.standing, self.carried, contacts)
         return Surroundings(scene, self.q, self.fingers)
 
-    def after(self, step: Step, arms: Mapping[str, Arm]) -> "Situation":
+    def after(self, step: Step, arms: Mapping[str, PlacedArm]) -> "Situation":
         """The situation after a step (the symbolic state does not change here)."""
         match step:
-            case Motion(gripper, path):
+            case Motion(arm, path):
                 q = self.q.copy()
-                q[arm_slice(gripper)] = path[-1]
+                q[arm.slice] = path[-1]
                 return replace(self, q=q)
             case Fingers(gripper, value):
                 return replace(self, fingers={**self.fingers, gripper: value})
@@ -96,7 +95,7 @@ class Situation:
                 standing = {**self.standing, **{box: poses[box] for box in boxes}}
                 return replace(self, standing=standing, carried=carried)
 
-    def keyframe(self, arms: Mapping[str, Arm]) -> Keyframe:
+    def keyframe(self, arms: Mapping[str, PlacedArm]) -> Keyframe:
         """The configuration x_k."""
         return Keyframe(self.q, self.boxes(arms))
 
@@ -105,9 +104,9 @@ class Situation:
         return frozenset(frozenset((box, gripper)) for box, gripper in self.state.held)
 
 
-def tool_pose(arm: Arm, q: Array) -> Array:
-    """Pose (7,) of the tool frame for a configuration (14,)."""
-    return matrix_pose(*arm.forward(q[arm_slice(arm.gripper)]))
+def tool_pose(arm: PlacedArm, q: Array) -> Array:
+    """Pose (7,) of the tool frame for a configuration (n,)."""
+    return matrix_pose(*arm.forward(q[arm.arm.slice]))
 
 
 def matrix_pose(rotation: Array, position: Array) -> Array:

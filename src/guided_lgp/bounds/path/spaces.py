@@ -5,43 +5,42 @@ from collections.abc import Mapping
 import numpy as np
 
 from guided_lgp.bounds.path.collision import CollisionChecker
-from guided_lgp.bounds.path.ik import REACH, Arm, continuous_near, unwrapped
 from guided_lgp.bounds.results import Array
-from guided_lgp.scene.pr2 import JOINT_LIMITS, arm_slice
+from guided_lgp.robots import PlacedArm
 
 STEP = 0.015
 """Largest motion (m), by the levers' bound, of any point between two checked configurations."""
 _LEVEL_STEP = 0.007
 """The same for level motions, where the motion is known and not a bound."""
-_JUMP = 0.35
-"""Largest change (rad) of a joint in one step of a level motion or a straight line; beyond it the
-inverse kinematics jumped."""
+
+
+_SAME = 1e-6
+"""Difference (sine of half an angle) of two solutions that are the same."""
 
 
 class JointSpace:
-    """Points are the arm's joints (7,); the other arm stands still."""
-
-    scale = REACH
+    """Points are the arm's joints (n,); the other arms stand still."""
 
     def __init__(
         self,
         checker: CollisionChecker,
-        arm: Arm,
+        arm: PlacedArm,
         q: Array,
         fingers: Mapping[str, float],
     ) -> None:
-        """The checker's mode must be the one of the motion; ``q`` (14,) holds the other arm."""
+        """The checker's mode must be the one of the motion; ``q`` holds the other arms."""
         self._checker = checker
         self._q = q
         self._fingers = fingers
-        self._joints = arm_slice(arm.gripper)
-        limits = JOINT_LIMITS[self._joints].copy()
-        limits[[4, 6]] = -np.pi, np.pi
+        self._joints = arm.arm.slice
+        self.scale = arm.arm.reaches
+        limits = arm.arm.limits.copy()
+        limits[arm.turning] = -np.pi, np.pi
         self.low, self.high = limits.T
 
     def path(self, start: Array, end: Array) -> Array:
-        """Configurations of the arm (n, 7) along the line."""
-        count = 2 + int(np.sum(np.abs(end - start) * REACH) / STEP)
+        """Configurations of the arm (m, n) along the line."""
+        count = 2 + int(np.sum(np.abs(end - start) * self.scale) / STEP)
         return np.asarray(np.linspace(start, end, count))
 
     def free(self, start: Array, end: Array) -> bool:
@@ -49,11 +48,11 @@ class JointSpace:
         return self.collision(self.path(start, end)) is None
 
     def collision(self, path: Array) -> tuple[str, str] | None:
-        """The first pair of bodies in collision along configurations (n, 7) of the arm."""
+        """The first pair of bodies in collision along configurations (m, n) of the arm."""
         return self._checker.first_collision(self._whole(path), self._fingers)
 
     def distances(self, path: Array, count: int) -> tuple[Array, Array]:
-        """The smallest distances (n, count) of bodies along a path (n, 7), and gradients."""
+        """The smallest distances (n, count) of bodies along a path (m, n), and gradients."""
         values, gradients = self._checker.distances(self._whole(path), self._fingers, count)
         return values, gradients[..., self._joints]
 
@@ -64,45 +63,41 @@ class JointSpace:
 
 
 class LevelSpace:
-    """Points are tool position (m), yaw about the vertical and pan angle (rad): (5,).
+    """Points are tool position (m), yaw about the vertical and redundant joint (rad): (5,).
 
-    The hand keeps its tilt: what it holds stays level. One side of the elbow throughout.
+    The hand keeps its tilt: what it holds stays level. One branch of the inverse kinematics
+    throughout. The last coordinate does nothing where no joint is redundant.
     """
 
     scale = np.array([1.5, 1.5, 1.5, 0.3, 0.5])
 
-    def __init__(self, joints: JointSpace, arm: Arm, rotation: Array, side: int) -> None:
-        """``rotation`` (3, 3) of the tool at yaw zero; ``side`` of the elbow."""
+    def __init__(self, joints: JointSpace, arm: PlacedArm, rotation: Array, branch: int) -> None:
+        """``rotation`` (3, 3) of the tool at yaw zero; ``branch`` of the inverse kinematics."""
         self._joints = joints
         self._arm = arm
         self._rotation = rotation
-        self._side = side
-        pan = JOINT_LIMITS[arm_slice(arm.gripper)][0]
-        self.low = np.array([*(arm.shoulder - 0.9), -np.pi, pan[0]])
-        self.high = np.array([*(arm.shoulder + 0.9), np.pi, pan[1]])
+        self._branch = branch
+        low, high = arm.workspace
+        redundant = arm.arm.redundant
+        free = (0.0, 0.0) if redundant is None else arm.arm.limits[redundant]
+        self.low = np.array([*low, -np.pi, free[0]])
+        self.high = np.array([*high, np.pi, free[1]])
 
     def path(self, start: Array, end: Array) -> Array | None:
-        """Configurations of the arm (n, 7) along the line, or None out of reach."""
+        """Configurations of the arm (m, n) along the line, or None out of reach."""
         count = 2 + int(np.sum(np.abs(end - start) * (1, 1, 1, 0.25, 0.5)) / _LEVEL_STEP)
         points = np.linspace(start, end, count)
         rotation = turned(self._rotation, points[:, 3])
         q, valid = self._arm.inverse(rotation, points[:, :3], points[:, 4])
-        return continuous_path(q[:, self._side], valid[:, self._side])
+        path = self._arm.follow(q, valid, self._branch)
+        if path is None or np.abs(np.sin((path[-1] - q[-1, self._branch]) / 2)).max() > _SAME:
+            return None
+        return path
 
     def free(self, start: Array, end: Array) -> bool:
         """Whether the line is within reach and free of collisions."""
         path = self.path(start, end)
         return path is not None and self._joints.collision(path) is None
-
-
-def continuous_path(q: Array, valid: Array) -> Array | None:
-    """The solutions (n, 7) as one motion, or None where one is missing or jumps."""
-    if not valid.all():
-        return None
-    path = unwrapped(q)
-    if np.abs(np.diff(path, axis=0)).max(initial=0.0) > _JUMP:
-        return None
-    return path
 
 
 def turned(rotation: Array, yaw: Array) -> Array:
@@ -112,7 +107,7 @@ def turned(rotation: Array, yaw: Array) -> Array:
     return np.asarray(turn @ rotation)
 
 
-def wound(path: Array, start: Array) -> Array:
-    """A motion (n, 7) with its continuous joints turned to begin next to ``start`` (7,)."""
-    first = continuous_near(path[0], start)
+def wound(path: Array, arm: PlacedArm, start: Array) -> Array:
+    """A motion (m, n) with joints turned by full turns to begin next to ``start`` (n,)."""
+    first = arm.near(path[0], start)
     return np.asarray(path + (first - path[0]))

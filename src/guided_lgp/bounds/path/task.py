@@ -7,25 +7,22 @@ from enum import IntEnum
 import numpy as np
 
 from guided_lgp.bounds.path.grips import Grips
-from guided_lgp.bounds.path.ik import REACH, Arm, continuous_near
 from guided_lgp.bounds.path.motions import Motion, Mover, Surroundings, Tool, Transit
 from guided_lgp.bounds.path.situation import Situation, Step
 from guided_lgp.bounds.path.steps import manoeuvre
 from guided_lgp.bounds.results import Array, Keyframe
 from guided_lgp.logic import Skeleton, successor
 from guided_lgp.poses import compose, pose
-from guided_lgp.scene import GRIPPERS, Scene
-from guided_lgp.scene.pr2 import FINGER_LIMITS, HOME, arm_slice
+from guided_lgp.robots import PlacedArm
+from guided_lgp.scene import Scene
 from guided_lgp.scene.world import initial_poses
 
-_PANS = np.linspace(-0.7, 2.28, 15)
-"""Pan angles (rad) of the left arm that are tried for every pose, beside the coarse one."""
-PAN_SHIFTS = (0.0, 0.25, -0.25, 0.5, -0.5)
-"""Turns of the pan joint (rad) on the straight way off a box that are tried."""
+_SHIFTS = (0.0, 0.25, -0.25, 0.5, -0.5)
+"""Turns of the redundant joint (rad) on the straight way off a box that are tried."""
 
 
 Choice = tuple[int, int, int]
-"""Tool pose, pan angle and side of the elbow."""
+"""Tool pose, value of the redundant joint, branch of the inverse kinematics."""
 
 
 class Stage(IntEnum):
@@ -82,16 +79,17 @@ class Reach:
     way: Array
     """(N, 3) from the contact to where the tool is off it (m)."""
     q: Array
-    """(N, 2, P, 2, 7): at the contact and off it, by pan angle and side of the elbow."""
-    pans: Array
-    """(P,) rad."""
+    """(N, 2, R, B, n): at the contact and off it, by redundant joint and branch."""
+    redundancies: Array
+    """(R,) values of the redundant joint (rad)."""
     cost: Array
-    """(N, P, 2): distance of the second from the home posture; infinite out of reach."""
+    """(N, R, B): distance of the second from the home posture; infinite out of reach."""
 
     def tool(self, choice: Choice) -> Tool:
         """The tool at the contact."""
-        number, pan, side = choice
-        return Tool(self.rotation[number], self.contact[number], float(self.pans[pan]), side)
+        number, value, branch = choice
+        redundancy = float(self.redundancies[value])
+        return Tool(self.rotation[number], self.contact[number], redundancy, branch)
 
     def order(self, extra: Array | float = 0.0) -> list[Choice]:
         """All configurations within reach, cheapest first; ``extra`` (N,) is added to the cost."""
@@ -110,7 +108,7 @@ class Task:
         self,
         scene: Scene,
         mover: Mover,
-        grips: Mapping[str, tuple[Grips, Grips]],
+        grips: Mapping[tuple[str, str], tuple[Grips, Grips]],
         skeleton: Skeleton,
         contacts: Sequence[Keyframe],
         failure: FurthestFailure,
@@ -131,8 +129,8 @@ class Task:
             self.states.append(successor(self.states[-1], action))
         self.start = Situation(
             scene.state,
-            np.concatenate([HOME[gripper] for gripper in GRIPPERS]),
-            dict.fromkeys(GRIPPERS, FINGER_LIMITS[0]),
+            mover.robot.home,
+            {gripper: arm.fingers.closed for gripper, arm in mover.robot.arms.items()},
             initial_poses(scene),
             {},
         )
@@ -155,44 +153,50 @@ class Task:
         """The gripper that holds a body, or what the body stands on, before an action."""
         return self.states[index].holder(self.root(index, body))
 
-    def reach(self, index: int, arm: Arm, rotation: Array, contact: Array, way: Array) -> Reach:
+    def reach(
+        self, index: int, arm: PlacedArm, rotation: Array, contact: Array, way: Array
+    ) -> Reach:
         """Solve the inverse kinematics of N tool poses at the contact and off it."""
-        q = self.contacts[index].q[arm_slice(arm.gripper)]
-        pans = np.append(_PANS * arm.sign[0], q[0])
+        coarse = arm.redundancy(self.contacts[index].q[arm.arm.slice])
+        values = np.append(arm.redundancies, coarse)
         positions = np.stack([contact, contact + way], axis=1)[:, :, None]
         q, valid = arm.inverse(
             rotation[:, None, None],
             positions,
-            np.broadcast_to(pans, (len(contact), 2, len(pans))),
+            np.broadcast_to(values, (len(contact), 2, len(values))),
         )
-        distance = np.linalg.norm((q[:, 1] - arm.home) * REACH, axis=-1)
+        distance = np.linalg.norm((q[:, 1] - arm.arm.home) * arm.arm.reaches, axis=-1)
         cost = np.where(valid.all(axis=1), distance, np.inf)
-        return Reach(rotation, contact, way, q, pans, cost)
+        return Reach(rotation, contact, way, q, values, cost)
 
     def level_reach(self, reach: Reach, gripper: str, situation: Situation) -> Reach:
-        """What a level motion can reach: the elbow's side stays; the nearest first."""
-        now = situation.q[arm_slice(gripper)]
-        side = self.mover.side(gripper, now)
-        distance = np.linalg.norm((continuous_near(reach.q[:, 1], now) - now) * REACH, axis=-1)
-        cost = np.where(np.isfinite(reach.cost), distance, np.inf)
-        cost[..., 1 - side] = np.inf
-        return replace(reach, cost=cost)
+        """What a level motion can reach: the branch stays; the nearest first."""
+        arm, now = self.arms[gripper], situation.q[self.arms[gripper].arm.slice]
+        way = (arm.near(reach.q[:, 1], now) - now) * arm.arm.reaches
+        same = np.isfinite(reach.cost)
+        same[..., np.arange(same.shape[-1]) != arm.branch(now)] = False
+        return replace(reach, cost=np.where(same, np.linalg.norm(way, axis=-1), np.inf))
+
+    def shifts(self, gripper: str) -> tuple[float, ...]:
+        """Turns of an arm's redundant joint on a straight way off that are worth a try."""
+        return _SHIFTS[:1] if self.arms[gripper].arm.redundant is None else _SHIFTS
 
     def transit(
         self, surroundings: Surroundings, start: Array, goal: Array, keep_level: bool
     ) -> list[Motion] | None:
-        """A free motion to joints ``goal`` (7,), with rests at some corners, or None."""
+        """A free motion to joints ``goal`` (n,), with rests at some corners, or None."""
         plan = self.mover.level_transit if keep_level else self.mover.transit
         paths = plan(surroundings, start, goal, self.rng)
-        gripper, transit = surroundings.scene.gripper, Transit(surroundings, keep_level)
-        return None if paths is None else [Motion(gripper, path, transit) for path in paths]
+        arm, transit = self.arms[surroundings.scene.gripper].arm, Transit(surroundings, keep_level)
+        return None if paths is None else [Motion(arm, path, transit) for path in paths]
 
     def home(self, situation: Situation, gripper: str) -> list[Motion] | None:
         """A free motion of an arm to its side; none where it carries a stack, or is there."""
-        now = situation.q[arm_slice(gripper)]
-        if situation.loaded(gripper) or np.array_equal(now, HOME[gripper]):
+        arm = self.arms[gripper].arm
+        now = situation.q[arm.slice]
+        if situation.loaded(gripper) or np.array_equal(now, arm.home):
             return []
-        return self.transit(situation.around(gripper), now, HOME[gripper], keep_level=False)
+        return self.transit(situation.around(gripper), now, arm.home, keep_level=False)
 
     def after(self, situation: Situation, steps: Sequence[Step]) -> Situation:
         """The situation after steps."""
@@ -212,6 +216,10 @@ class Task:
             return np.array(self.tables[body].half_extents)
         return np.array(self.boxes[body].size[:2]) / 2
 
+    def opened(self, gripper: str) -> float:
+        """The value of a gripper's fingers at which they are wide open."""
+        return self.arms[gripper].arm.fingers.opened
+
     def record(self, index: int, stage: Stage, constraint: str) -> None:
         """Remember an obstacle of an action."""
         self.failure.record(index, stage, constraint)
@@ -219,7 +227,7 @@ class Task:
     def blocked(
         self, index: int, stage: Stage, where: str, surroundings: Surroundings, q: Array
     ) -> bool:
-        """Whether configurations (n, 7) of the moving arm collide, and remember it."""
+        """Whether configurations (m, n) of the moving arm collide, and remember it."""
         pair = self.mover.collision(surroundings, q)
         if pair is not None:
             self.record(index, stage, f"collision {' '.join(pair)} {where}")

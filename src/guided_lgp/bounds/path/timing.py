@@ -8,9 +8,8 @@ from types import ModuleType
 
 import numpy as np
 
-from guided_lgp.bounds.path.ik import REACH
 from guided_lgp.bounds.results import Array
-from guided_lgp.scene.pr2 import ACCELERATION_LIMITS, VELOCITY_LIMITS, arm_slice
+from guided_lgp.robots import Arm
 
 
 @contextmanager
@@ -40,25 +39,24 @@ _GRID_STEP = 0.04
 logging.getLogger("toppra").setLevel(logging.ERROR)
 
 
-def time_path(path: Array, gripper: str) -> tuple[Array, Array]:
+def time_path(path: Array, arm: Arm) -> tuple[Array, Array]:
     """Follow a path of one arm from rest to rest.
 
     Args:
-        path: configurations (n, 7) in rad, close enough for a cubic spline to stay on the path.
-        gripper: whose arm it is.
+        path: configurations (m, n) in rad, close enough for a cubic spline to stay on the path.
+        arm: whose it is.
 
     Returns:
-        times (T,) from 0 (s), and configurations (T, 7).
+        times (T,) from 0 (s), and configurations (T, n).
     """
-    joints = arm_slice(gripper)
-    lengths = np.sum(np.abs(np.diff(path, axis=0)) * REACH, axis=1)
+    lengths = np.sum(np.abs(np.diff(path, axis=0)) * arm.reaches, axis=1)
     path = path[np.concatenate([[True], lengths > 1e-9])]
     s = np.concatenate([[0.0], np.cumsum(lengths[lengths > 1e-9])])
     if len(path) == 1:
         return np.zeros(1), path
     curve = toppra.SplineInterpolator(s, path, bc_type="natural")
-    velocity = _SHARE * VELOCITY_LIMITS[joints]
-    acceleration = _SHARE * ACCELERATION_LIMITS[joints]
+    velocity = _SHARE * arm.velocity_limits
+    acceleration = _SHARE * arm.acceleration_limits
     instance = toppra.algorithm.TOPPRA(
         [
             toppra.constraint.JointVelocityConstraint(np.stack([-velocity, velocity], axis=1)),
@@ -81,10 +79,10 @@ def time_path(path: Array, gripper: str) -> tuple[Array, Array]:
 def _stretch(rows: Array, step: float, velocity: Array, acceleration: Array) -> float:
     """The factor on time that keeps the limits between toppra's grid points, too.
 
-    Finite differences of rows (T, 7) at equal steps (s), before and after at rest.
+    Finite differences of rows (T, n) at equal steps (s), before and after at rest.
     """
     rates = np.diff(rows, axis=0) / step
-    changes = np.diff(np.vstack([np.zeros(7), rates, np.zeros(7)]), axis=0) / step
+    changes = np.diff(np.pad(rates, ((1, 1), (0, 0))), axis=0) / step
     changes[[0, -1]] *= 2.0  # from rest to the middle of the first interval: half a step
     excess = max(
         np.max(np.abs(rates) / velocity),

@@ -1,38 +1,40 @@
 import numpy as np
 import pytest
-from motions import scene
 
-from guided_lgp.bounds.path.ik import Arm, continuous_near, unwrapped
 from guided_lgp.poses import rotation_matrix
-from guided_lgp.scene import GRIPPERS, PlacedRobot
-from guided_lgp.scene.pr2 import CONTINUOUS, HOME_CONFIGURATION, JOINT_LIMITS, arm_slice, tool_pose
+from guided_lgp.robots import PlacedArm
+from guided_lgp.scene import PlacedRobot
 
-TURNED = scene(red=(0.5, 0.3, 0.65, 0.0, "tab1")).model_copy(
-    update={"robot": PlacedRobot(base=(0.1, -0.2, 0.3), torso=0.2)}
-)
+TURNED = PlacedRobot(base=(0.1, -0.2, 0.3), torso=0.2)
+ROBOT = TURNED.description
+GRIPPERS = ROBOT.grippers
+
+
+def placed(gripper: str) -> PlacedArm:
+    return PlacedArm(ROBOT, gripper, TURNED.base_pose, TURNED.fixed_values)
 
 
 def _postures(gripper: str, count: int) -> np.ndarray:
-    limits = JOINT_LIMITS[arm_slice(gripper)]
+    limits = ROBOT.arms[gripper].limits
     return np.random.default_rng(1).uniform(limits[:, 0], limits[:, 1], (count, 7))
 
 
 @pytest.mark.parametrize("gripper", GRIPPERS)
 def test_forward_kinematics_agree_with_pinocchio(gripper: str) -> None:
-    arm = Arm(TURNED, gripper)
+    arm = placed(gripper)
     postures = _postures(gripper, 50)
     rotation, position = arm.forward(postures)
     for joints, turn, origin in zip(postures, rotation, position, strict=True):
-        q = HOME_CONFIGURATION.copy()
-        q[arm_slice(gripper)] = joints
-        expected = tool_pose(TURNED, q, gripper)
+        q = ROBOT.home.copy()
+        q[ROBOT.arms[gripper].slice] = joints
+        expected = TURNED.tool_pose(q, gripper)
         assert origin == pytest.approx(expected[:3], abs=1e-9)
         assert turn == pytest.approx(rotation_matrix(expected[3:]), abs=1e-9)
 
 
 @pytest.mark.parametrize("gripper", GRIPPERS)
 def test_inverse_finds_the_posture_behind_every_pose(gripper: str) -> None:
-    arm = Arm(TURNED, gripper)
+    arm = placed(gripper)
     postures = _postures(gripper, 300)
     postures = postures[np.all(np.abs(postures[:, [3, 5]]) > 0.1, axis=1)]
     found, valid = arm.inverse(*arm.forward(postures), postures[:, 0])
@@ -45,29 +47,40 @@ def test_inverse_finds_the_posture_behind_every_pose(gripper: str) -> None:
 
 @pytest.mark.parametrize("gripper", GRIPPERS)
 def test_every_valid_solution_reaches_the_pose_within_limits(gripper: str) -> None:
-    arm = Arm(TURNED, gripper)
+    arm = placed(gripper)
     rotation, position = arm.forward(_postures(gripper, 40))
-    pans = np.linspace(*JOINT_LIMITS[arm_slice(gripper)][0], 9)[None]
+    pans = np.linspace(*ROBOT.arms[gripper].limits[0], 9)[None]
     found, valid = arm.inverse(rotation[:, None], position[:, None], pans)
     assert 0.05 < valid.mean() < 0.95
     turn, origin = arm.forward(found)
     assert np.abs(origin - position[:, None, None])[valid].max() < 1e-9
     assert np.abs(turn - rotation[:, None, None])[valid].max() < 1e-9
-    limits = JOINT_LIMITS[arm_slice(gripper)]
+    limits = ROBOT.arms[gripper].limits
     assert np.all((found[valid] >= limits[:, 0]) & (found[valid] <= limits[:, 1]))
 
 
 def test_out_of_reach_is_not_valid() -> None:
-    arm = Arm(TURNED, "pr2L")
+    arm = placed("pr2L")
     _, valid = arm.inverse(np.eye(3), np.array([3.0, 0.0, 1.0]), np.array(0.3))
     assert not valid.any()
 
 
-def test_continuous_joints_follow_the_reference_and_have_no_jumps() -> None:
+def test_a_branch_is_followed_without_jumps() -> None:
+    arm = placed("pr2L")
+    start = np.array([0.3, 0.3, 0.9, -1.4, 3.0, -0.9, -3.0])
+    rotation, position = arm.forward(start)
+    along = position + np.linspace(0.0, 0.1, 12)[:, None] * [0.0, 0.4, 0.9]
+    q, valid = arm.inverse(rotation, along, np.full(12, start[0]))
+    path = arm.follow(q, valid, arm.branch(start))
+    assert path is not None
+    assert np.abs(np.diff(path, axis=0)).max() < 0.35
+    assert arm.near(path[0], start) == pytest.approx(start, abs=1e-9)
+    assert arm.follow(q, np.zeros_like(valid), 0) is None
+
+
+def test_joints_of_more_than_a_turn_follow_the_reference() -> None:
+    arm = placed("pr2L")
     reference = np.array([0.0, 0.0, 0.0, 0.0, 3.0, 0.0, -3.0])
     q = np.array([0.0, 0.0, 0.0, 0.0, -3.0, 0.0, 3.0])
-    near = continuous_near(q, reference)
-    assert np.abs(near - reference).max() < np.pi
-    path = unwrapped(np.stack([reference, q]))
-    joints = [joint for joint in CONTINUOUS if joint < 7]
-    assert np.abs(np.diff(path[:, joints], axis=0)).max() < np.pi
+    assert np.abs(arm.near(q, reference) - reference).max() < np.pi
+    assert arm.turning.tolist() == [4, 6]
