@@ -2,7 +2,7 @@
 
 from functools import cached_property
 
-from guided_lgp.bounds.coarse import CoarseBound
+from guided_lgp.bounds.coarse import CoarseBound, check_terms
 from guided_lgp.bounds.path import PathBound, check_motions
 from guided_lgp.bounds.results import CoarseResult, PathResult
 from guided_lgp.logic import Skeleton
@@ -19,6 +19,7 @@ class SceneBounds:
     """
 
     def __init__(self, scene: Scene, params: BoundsParams) -> None:
+        check_terms(scene.symbols.domain)
         check_motions(scene.symbols.domain)
         self.scene = scene
         self._coarse_bound = CoarseBound(scene, params.coarse_tries)

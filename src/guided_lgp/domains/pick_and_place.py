@@ -22,7 +22,7 @@ Gripper, Table = Type("gripper"), Type("table")
 Box = Type("box", also=(Table,), parents=(Gripper, Table))
 g, b, t = Gripper("gripper"), Box("box"), Table("table")
 
-pads, hold, beside, balanced_below = terms("pads hold beside balanced_below")
+pads, hold, beside = terms("pads hold beside")
 stand, balanced, present = terms("stand balanced present")
 transit, line_in, switch, line_out, home = terms("transit line_in switch line_out home")
 
@@ -31,7 +31,7 @@ grasp = Instruction(
     (g, b),
     precondition=(free(g), ~held(b)),
     effect=(attach(b, g),),
-    contact=(pads(g, b), hold(g, b), beside(b), balanced_below(b)),
+    contact=(pads(g, b), hold(g, b), beside(b)),
     motion=(
         present(b),
         transit(g),

@@ -7,7 +7,9 @@ every stack is balanced. An arm stands at its side, except while the box that it
 others.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from inspect import signature
 
 import numpy as np
 
@@ -17,10 +19,11 @@ from guided_lgp.bounds.program.geometry import Margins, SceneGeometry
 from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.bounds.program.slots import ArmConfiguration, HeldBox, KeyframeSlots
 from guided_lgp.bounds.results import Array
-from guided_lgp.bounds.terms import find_term, kernel_table
+from guided_lgp.bounds.terms import find_term, kernel_table, term_names
 from guided_lgp.bounds.terms.apart import keep_apart
 from guided_lgp.bounds.terms.clear import keep_clear
-from guided_lgp.logic import Action, Skeleton, successor
+from guided_lgp.errors import InputError
+from guided_lgp.logic import Domain, GroundInstruction, GroundTerm, Skeleton, successor
 
 
 @dataclass(frozen=True)
@@ -42,6 +45,7 @@ class Formulator:
 
     def __init__(self, geometry: SceneGeometry, margins: Margins) -> None:
         robot = kinematics_of(geometry.scene.robot.description)
+        self._domain = geometry.domain
         self._context = Context(geometry, robot, kernel_table(robot), margins)
 
     def build(self, skeleton: Skeleton) -> Formulation:
@@ -53,8 +57,10 @@ class Formulator:
         context = self._context
         at_switch, after_action = [], []
         for action in skeleton:
-            at_switch.append(self._contact(action))
-            self._switch(action)
+            ground = self._domain.bind(action)
+            context.begin(successor(context.state, action), straight_lines(ground.motion))
+            at_switch.append(self._contact(ground))
+            self._switch(ground)
             after_action.append(context.keyframe())
         return Formulation(
             program=context.program.build(),
@@ -66,35 +72,30 @@ class Formulator:
             after_action=tuple(after_action),
         )
 
-    def _contact(self, action: Action) -> KeyframeSlots:
+    def _contact(self, ground: GroundInstruction) -> KeyframeSlots:
         """What the action declares for its switch."""
         context = self._context
-        context.begin(successor(context.state, action), _lines(action))
-        for name, symbols in _contact(action):
-            self._add(name, *symbols)
-        if action.table is not None:
-            self._keep_standing_arms_clear(action.gripper, action.box)
+        for term in ground.contact:
+            self._add(term.name, *term.symbols, **term.options)
+        if ground.parent not in context.robot.arms:
+            self._keep_standing_arms_clear(ground.actor, ground.body)
         return context.keyframe()
 
-    def _switch(self, action: Action) -> None:
+    def _switch(self, ground: GroundInstruction) -> None:
         """The effect on the mode tree, and what holds because of it."""
-        context, body = self._context, action.box
-        parent = action.gripper if action.table is None else action.table
+        context, body = self._context, ground.body
         support = context.state.support_of(body)
-        held = context.held.pop(body, None)
-        if held is not None:
-            del context.hands[held.gripper]
-        if parent in context.robot.arms:
-            context.held[body] = context.hands[parent]
-            if context.state.carried_by(body):
-                self._add("level", body)
-        if support is not None and (below := context.after.support_of(support)) is not None:
+        context.attach(body, ground.parent)
+        if body in context.held and context.state.carried_by(body):
+            self._add("level", body)
+        below = None if support is None else context.after.support_of(support)
+        if support is not None and below is not None:
             self._add("balanced", support, below)
         context.end()
 
-    def _add(self, name: str, *symbols: str) -> None:
+    def _add(self, name: str, *symbols: str, **options: object) -> None:
         """A term, and the surroundings of the configurations that it adds."""
-        find_term(name).add(self._context, *symbols)
+        find_term(name).add(self._context, *symbols, **options)
         for configuration in self._context.take_added():
             self._keep_free(configuration)
 
@@ -117,22 +118,37 @@ class Formulator:
                 keep_clear(self._context, gripper, standing.joints, body)
 
 
-def _contact(action: Action) -> tuple[tuple[str, tuple[str, ...]], ...]:
-    """The terms of an action at its contact keyframe."""
-    g, b, t = action.gripper, action.box, action.table
-    if t is None:
-        return ("pads", (g, b)), ("hold", (g, b)), ("beside", (b,))
-    return (
-        ("present", (t,)),
-        ("stand", (b, t)),
-        ("balanced", (b, t)),
-        ("beside", (b, t)),
-        ("hold", (g, b)),
+def straight_lines(motion: Iterable[GroundTerm]) -> tuple[Line, ...]:
+    """The straight ways of a motion to and from its switch."""
+    return tuple(
+        Line(
+            gripper=step.symbols[0],
+            back=float(step.options.get("back", 0.0)),
+            up=float(step.options.get("down", 0.0)) + _SHARE * float(step.options.get("up", 0.0)),
+        )
+        for step in motion
+        if step.name in ("line_in", "line_out")
     )
 
 
-def _lines(action: Action) -> tuple[Line, ...]:
-    """The straight ways of an action's motion."""
-    if action.table is None:
-        return Line(action.gripper, 0.09, 0.0), Line(action.gripper, 0.0, 0.04)
-    return Line(action.gripper, 0.0, 0.08), Line(action.gripper, 0.09, 0.0)
+_SHARE = 0.5
+"""How much of a way up is asked for: halfway the hand may turn, the box is clear of its support."""
+
+
+def check_terms(domain: Domain) -> None:
+    """Check that every term that a domain declares is known, and takes its arguments.
+
+    Raises:
+        InputError: the first for which that is not so.
+    """
+    for instruction in domain.instructions:
+        for term in instruction.contact:
+            where = f"domain {domain.name}: {instruction.name}: {term.name}"
+            if term.name not in term_names():
+                raise InputError(where, "is an unknown term", ", ".join(term_names()))
+            add = find_term(term.name).add
+            try:
+                signature(add).bind(None, *term.arguments, **term.options)
+            except TypeError as error:
+                accepted = ", ".join(list(signature(add).parameters)[1:])
+                raise InputError(where, str(error), accepted) from None

@@ -99,6 +99,14 @@ class Context:
         """The straight ways of a gripper in the action's motion."""
         return tuple(line for line in self.lines if line.gripper == gripper)
 
+    def attach(self, body: str, parent: str) -> None:
+        """The body hangs on another parent from now on: a gripper, or something to stand on."""
+        held = self.held.pop(body, None)
+        if held is not None:
+            del self.hands[held.gripper]
+        if parent in self.robot.arms:
+            self.held[body] = self.hands[parent]
+
     def end(self) -> None:
         """The action is done: arms whose box carries nothing (any more) go to their side."""
         self.state = self.after

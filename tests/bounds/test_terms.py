@@ -1,0 +1,42 @@
+"""Terms: found by name, refused where unknown, their kernels against their checks."""
+
+from dataclasses import replace
+
+import pytest
+
+from guided_lgp.bounds.coarse import check_terms
+from guided_lgp.bounds.terms import find_term, term_names
+from guided_lgp.domains import domain_names, load_domain
+from guided_lgp.errors import InputError
+from guided_lgp.logic import Domain
+from guided_lgp.logic.declarations import Term
+
+
+def _with_contact(*contact: Term) -> Domain:
+    domain = load_domain()
+    first, *others = domain.instructions
+    return replace(domain, instructions=(replace(first, contact=contact), *others))
+
+
+@pytest.mark.parametrize("name", domain_names())
+def test_every_domain_declares_known_terms(name: str) -> None:
+    check_terms(load_domain(name))
+
+
+def test_every_file_is_a_term() -> None:
+    assert {"hold", "pads", "stand", "balanced", "beside", "clear", "apart"} <= set(term_names())
+    assert {"level", "carried", "present"} <= set(term_names())
+    assert all(find_term(name).add for name in term_names())
+
+
+def test_an_unknown_term_is_refused_by_name() -> None:
+    hand, box = load_domain().instructions[0].parameters
+    with pytest.raises(InputError, match=r"grasp: glue: is an unknown term .*apart, balanced"):
+        check_terms(_with_contact(Term("hold", (hand, box)), Term("glue", (hand, box))))
+
+
+def test_a_term_with_other_arguments_is_refused_by_name() -> None:
+    hand, box = load_domain().instructions[0].parameters
+    for term in (Term("hold", (hand,)), Term("hold", (hand, box, box))):
+        with pytest.raises(InputError, match=r"grasp: hold: .*argument.*accepted: gripper, box"):
+            check_terms(_with_contact(term))
