@@ -114,7 +114,7 @@ def _enumerated(scenes: Sequence[Scene], depth: int) -> dict[str, float]:
     count = len(scenes)
     return {
         "objectives": len(objectives),
-        "states": len(space.states),
+        "states": len(space),
         "verdicts": verdicts / count,
         "enumeration_s": seconds / count,
         "logic_s": logic_s / count,

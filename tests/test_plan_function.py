@@ -8,16 +8,17 @@ import pytest
 
 from guided_lgp import cli, load_scene, plan
 from guided_lgp.bounds.results import CoarseResult, Failure, PathResult
+from guided_lgp.domains import load_domain
 from guided_lgp.errors import InputError
 from guided_lgp.explanation import ObservedBounds, Obstacle
-from guided_lgp.logic import Action, Skeleton, State, parse_objective, parse_skeleton
+from guided_lgp.logic import Action, Skeleton, parse_objective, parse_skeleton
 from guided_lgp.planning import PlanningResult
 from guided_lgp.policy.registry import POLICIES
 from guided_lgp.search.result import Times
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "examples"
-START = State.of({"red": "tab1", "green": "tab1"})
+START = load_domain().state({"red": "tab1", "green": "tab1"})
 OBJECTIVE = parse_objective(["(on red green)"])
 
 

@@ -80,7 +80,7 @@ class Relational:
     def _first_actions(self, scene: Scene, goals: str) -> dict[str, float]:
         objective = parse_objective([f"{goal.strip()})" for goal in goals.split(")") if goal])
         for goal in objective:
-            scene.symbols.domain.check_goal(goal)
+            scene.symbols.domain.goal_type(goal)
         actions = list(applicable_actions(scene.state, scene.symbols))
         positions = observe(scene, start(scene))
         log_p = self._policy.log_probabilities(objective, scene.state, positions, actions)

@@ -25,6 +25,7 @@ from motions import (
 from guided_lgp.bounds.results import Array, Keyframe, Trajectory
 from guided_lgp.bounds.verify import verify_keyframe, verify_keyframes, verify_path
 from guided_lgp.bounds.verify.phase import STEP, resample
+from guided_lgp.domains import load_domain
 from guided_lgp.logic import Action, State, parse_skeleton
 from guided_lgp.poses import apply, compose, inverse, multiply, pose
 from guided_lgp.scene import Scene
@@ -35,7 +36,7 @@ HOME = PR2.home
 GRASP_RED = Action.parse("(grasp pr2L red)")
 GRASP_AND_PLACE = parse_skeleton("(grasp pr2L red) (place pr2L red tab1)")
 RIGHT_FROM_ABOVE = np.array([0.0, np.sqrt(0.5), 0.0, np.sqrt(0.5)])
-HOLDS_RED = State.of({"green": "tab2"}, {"red": "pr2L"})
+HOLDS_RED = load_domain().state({"green": "tab2"}, {"red": "pr2L"})
 
 
 @pytest.fixture(scope="module")
@@ -104,7 +105,7 @@ def test_link_through_a_table(world: World, two_boxes: Scene) -> None:
 
 def test_box_through_a_box(world: World) -> None:
     frame = keyframe(world, HOME, green=pose((0.55, 0.33, 0.65), 0.2))
-    state = State.of({"red": "tab1", "green": "tab1"})
+    state = load_domain().state({"red": "tab1", "green": "tab1"})
     assert constraints(world, frame, state) == "collision green red"
 
 
@@ -138,7 +139,7 @@ def into_the_end_of(tool: Array) -> Array:
     ids=["square", "across", "floating", "overhanging", "tilted"],
 )
 def test_tower_of_two(world: World, top: Array, reason: str) -> None:
-    state = State.of({"red": "tab1", "green": "red"})
+    state = load_domain().state({"red": "tab1", "green": "red"})
     assert constraints(world, keyframe(world, HOME, green=top), state) == reason
 
 
@@ -146,7 +147,7 @@ def test_tilted_tower(world: World) -> None:
     tip = np.array([0.05, 0, 0, 0.99875])
     lean = np.array([0.52, 0.30, 0.65, *multiply(pose((0, 0, 0), 0.2)[3:], tip)])
     top = compose(lean, pose((0, 0, 0.10)))
-    state = State.of({"red": "tab1", "green": "red"})
+    state = load_domain().state({"red": "tab1", "green": "red"})
     reasons = constraints(world, keyframe(world, HOME, red=lean, green=top), state)
     assert {"level red", "level green"} <= set(reasons.split("; "))
 

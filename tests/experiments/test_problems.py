@@ -30,9 +30,9 @@ def test_objectives_need_the_stated_number_of_actions(problem: ProblemClass) -> 
     symbols = problem.unguided_symbols(scene.symbols)
     operators = relaxed_operators(symbols)
     for objective in objectives:
-        assert contradiction(objective) is None
+        assert contradiction(objective, symbols) is None
         # At least so many by the landmarks, and no more: every goal takes one grasp, one place.
-        bound = LandmarkCut(goal_facts(objective), operators)(facts(scene.state, symbols))
+        bound = LandmarkCut(goal_facts(objective, symbols), operators)(facts(scene.state, symbols))
         assert bound == problem.k_min == 2 * len(objective)
 
 

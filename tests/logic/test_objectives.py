@@ -5,7 +5,6 @@ import pytest
 from guided_lgp.domains import load_domain
 from guided_lgp.errors import InputError
 from guided_lgp.logic import (
-    State,
     one_goal_objectives,
     parse_objective,
     two_goal_objectives,
@@ -16,7 +15,7 @@ from guided_lgp.logic import (
 SETUP_A = load_domain().symbols(
     gripper=("pr2L", "pr2R"), box=("red", "green", "blue"), table=("tab1", "tab2")
 )
-START = State.of({"red": "tab1", "green": "tab1", "blue": "tab2"})
+START = load_domain().state({"red": "tab1", "green": "tab1", "blue": "tab2"})
 
 
 def test_objectives_of_setup_a() -> None:

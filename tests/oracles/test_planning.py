@@ -45,7 +45,7 @@ def random_pair(symbols: Symbols, rng: np.random.Generator) -> tuple[State, Obje
     """A state after a random walk and a valid objective of one to three goals."""
     goals: list[Goal] = all_goals(symbols)
     while True:
-        state = State.of(dict.fromkeys(symbols.boxes, "tab1"))
+        state = load_domain().state(dict.fromkeys(symbols.boxes, "tab1"))
         for _ in range(rng.integers(12)):
             actions = list(applicable_actions(state, symbols))
             state = successor(state, actions[rng.integers(len(actions))])
@@ -100,7 +100,8 @@ def test_minimal_lengths_and_plans(symbols: Symbols, tmp_path: Path) -> None:
         space.explore()
         to_go = distances(space, objective)
         assert len(oracle) == to_go[0]
-        assert LandmarkCut(goal_facts(objective), operators)(facts(state, symbols)) <= to_go[0]
+        landmark_cut = LandmarkCut(goal_facts(objective, symbols), operators)
+        assert landmark_cut(facts(state, symbols)) <= to_go[0]
 
         theirs = [pddl.action(operator.name, symbols) for operator in oracle]
         assert satisfied(progress(state, theirs), objective)
@@ -113,7 +114,7 @@ def test_minimal_lengths_and_plans(symbols: Symbols, tmp_path: Path) -> None:
                 for action, target in space.transitions(number)
                 if to_go.get(target) == to_go[number] - 1
             )
-            steps.append(pddl.step(space.states[number], action, symbols))
+            steps.append(pddl.step(space.state(number), action, symbols))
             number = target
         task = validated_task(template, state, objective, symbols)
         plan = reader.parse_plan_string(task, "\n".join(steps))

@@ -3,6 +3,7 @@
 import pytest
 from scripted import UNIFORM, Scorer, ScriptedBounds
 
+from guided_lgp.domains import load_domain
 from guided_lgp.errors import InputError
 from guided_lgp.logic import Action, Objective, State, parse_objective, parse_skeleton, progress
 from guided_lgp.params import SearchLimits
@@ -16,7 +17,7 @@ PLAN = parse_skeleton(
 )
 
 
-START = State.of({"red": "tab1", "green": "tab1", "blue": "tab1"})
+START = load_domain().state({"red": "tab1", "green": "tab1", "blue": "tab1"})
 ADVICE = {progress(START, PLAN[:k]): action for k, action in enumerate(PLAN)}
 
 

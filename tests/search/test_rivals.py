@@ -91,14 +91,15 @@ def test_landmark_cut_is_admissible_and_informed() -> None:
     informed = 0
     for objective in objectives:
         exact = distances(space, objective)
-        landmark_cut = LandmarkCut(goal_facts(objective), relaxed_operators(symbols))
-        for number, state in enumerate(space.states):
+        landmark_cut = LandmarkCut(goal_facts(objective, symbols), relaxed_operators(symbols))
+        for number in range(len(space)):
+            state = space.state(number)
             bound = landmark_cut(facts(state, symbols))
-            assert least_actions(state, objective) <= exact[number]
+            assert least_actions(state, objective, symbols) <= exact[number]
             assert bound <= exact[number]
             assert (bound == 0) == (exact[number] == 0)
             informed += bound == exact[number]
-    assert informed > 0.8 * len(objectives) * len(space.states)
+    assert informed > 0.8 * len(objectives) * len(space)
 
 
 def test_a_layer_ends_at_the_limit_of_the_size() -> None:

@@ -16,7 +16,7 @@ SETUP_D = load_domain().symbols(gripper=GRIPPERS, box=COLOURS, table=("tab1", "t
 
 
 def on_tab1(boxes: int) -> State:
-    return State.of(dict.fromkeys(COLOURS[:boxes], "tab1"))
+    return load_domain().state(dict.fromkeys(COLOURS[:boxes], "tab1"))
 
 
 @pytest.mark.parametrize(
@@ -51,7 +51,7 @@ def test_reachable_states_of_setup_a() -> None:
     # tables or are held by a gripper, at most one each: 4, 14 and 44 ways.
     space = StateSpace(SETUP_A, on_tab1(3))
     space.explore()
-    assert len(space.states) == 9 * 4 + 6 * 14 + 1 * 44
+    assert len(space) == 9 * 4 + 6 * 14 + 1 * 44
 
 
 def test_distances() -> None:
@@ -71,4 +71,4 @@ def test_a_large_tree_is_fast_and_small() -> None:
         node += 1
     assert time.process_time() - start < 10
     # Only few symbolic states are behind the nodes: what a node costs is its three integers.
-    assert len(tree.space.states) < len(tree) / 20
+    assert len(tree.space) < len(tree) / 20

@@ -29,7 +29,7 @@ POSITIONS = {
     "tab1": np.array([0.54, 0.33, 0.6]),
     "tab2": np.array([0.54, -0.33, 0.6]),
 }
-STATE = State.of({"red": "tab1", "green": "tab1", "blue": "red"})
+STATE = load_domain().state({"red": "tab1", "green": "tab1", "blue": "red"})
 
 
 @pytest.fixture

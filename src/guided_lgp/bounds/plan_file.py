@@ -123,9 +123,9 @@ class Plan(_Document):
             if not attachment.start <= attachment.end < rows:
                 raise ValueError(f"attachment of {attachment.box} lies outside path.times")
         for text in self.objective:
-            symbols.domain.check_goal(Goal.parse(text))
+            symbols.domain.goal_type(Goal.parse(text))
         for text in self.actions:
-            symbols.domain.check_action(Action.parse(text))
+            symbols.domain.instruction(Action.parse(text))
         return self
 
 

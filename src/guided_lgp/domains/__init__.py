@@ -1,5 +1,6 @@
 """Domains, one file each: types, instructions and goal types. A new file is a new domain."""
 
+from functools import cache
 from importlib import import_module
 from pkgutil import iter_modules
 
@@ -15,6 +16,7 @@ def domain_names() -> tuple[str, ...]:
     return tuple(sorted(module.name for module in iter_modules(__path__)))
 
 
+@cache
 def load_domain(name: str = PAPER) -> Domain:
     """The domain that the file of this name declares as ``DOMAIN``.
 

@@ -26,7 +26,12 @@ class Type:
 
     def is_a(self, other: "Type") -> bool:
         """Whether every symbol of this type is one of the other."""
-        return self == other or any(further.is_a(other) for further in self.also)
+        return other.name in self.kinds
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """The names of all types that a symbol of this one is of, its own first."""
+        return (self.name, *(name for further in self.also for name in further.kinds))
 
 
 @dataclass(frozen=True)
@@ -85,6 +90,21 @@ def same(one: Variable, other: Variable) -> Atom:
 
 
 @dataclass(frozen=True)
+class FactType:
+    """A predicate that the mode tree does not tell: ``opened = FactType("open", (d,))``.
+
+    Calling it makes an atom of it, for conditions and, what holds from then on, for effects.
+    """
+
+    name: str
+    parameters: tuple[Variable, ...]
+
+    def __call__(self, *arguments: Variable) -> Atom:
+        """The statement about these parameters."""
+        return Atom(self.name, arguments)
+
+
+@dataclass(frozen=True)
 class Attach:
     """The effect that the body hangs on another parent from now on; see :func:`attach`."""
 
@@ -119,14 +139,15 @@ def terms(names: str) -> tuple[Callable[..., Term], ...]:
 class Instruction:
     """A kind of action: what it needs, what it changes, and its geometry.
 
-    The first parameter is the acting gripper. ``contact`` are the terms that it adds at its contact
-    keyframe, ``motion`` the steps of its motion, both in order.
+    The first parameter is the acting gripper. One effect attaches a body; others are facts.
+    ``contact`` are the terms that it adds at its contact keyframe, ``motion`` the steps of its
+    motion, both in order.
     """
 
     name: str
     parameters: tuple[Variable, ...]
     precondition: tuple[Atom, ...]
-    effect: tuple[Attach, ...]
+    effect: tuple[Attach | Atom, ...]
     contact: tuple[Term, ...] = ()
     motion: tuple[Term, ...] = ()
 

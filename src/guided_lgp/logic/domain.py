@@ -1,13 +1,24 @@
-"""A domain: types, instructions and goal types, and what a ground action is by its declaration."""
+"""A domain, and what a ground action is by its declaration."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache
 
 from guided_lgp.errors import InputError
 from guided_lgp.logic.actions import Action, Goal
-from guided_lgp.logic.declarations import GoalType, Instruction, Term, Type, Variable
-from guided_lgp.logic.symbols import Symbols
+from guided_lgp.logic.declarations import (
+    Atom,
+    Attach,
+    FactType,
+    GoalType,
+    Instruction,
+    Term,
+    Type,
+    Variable,
+)
+from guided_lgp.logic.state import Fact, GroundAtom, State
+from guided_lgp.logic.symbols import GRIPPER, Symbols
+from guided_lgp.logic.validation import check_declarations
 
 
 @dataclass(frozen=True)
@@ -30,18 +41,38 @@ class GroundInstruction:
     """What changes its parent ..."""
     parent: str
     """... and what it hangs on afterwards."""
+    into_hand: bool
+    """Whether that parent is a gripper."""
+    precondition: tuple[GroundAtom, ...]
+    facts: tuple[GroundAtom, ...]
+    """What else is true afterwards."""
     contact: tuple[GroundTerm, ...]
     motion: tuple[GroundTerm, ...]
+
+    def facts_after(self, state: State) -> tuple[Fact, ...]:
+        """The facts that hold after it."""
+        facts = set(state.facts)
+        for predicate, symbols, negated in self.facts:
+            (facts.discard if negated else facts.add)((predicate, *symbols))
+        return tuple(sorted(facts))
 
 
 @dataclass(frozen=True)
 class Domain:
-    """Types, instructions and goal types; children and goals keep their order."""
+    """Types, instructions, goal types and facts; children and goals keep their order.
+
+    Raises:
+        InputError: something is declared that cannot be served.
+    """
 
     name: str
     types: tuple[Type, ...]
     instructions: tuple[Instruction, ...]
     goal_types: tuple[GoalType, ...]
+    facts: tuple[FactType, ...] = ()
+
+    def __post_init__(self) -> None:
+        check_declarations(self)
 
     def __hash__(self) -> int:
         return hash(self.name)
@@ -61,7 +92,8 @@ class Domain:
         for name in every:
             if every.count(name) > 1:
                 raise InputError("symbols", f"name {name!r} is used twice")
-        return Symbols(self, {wanted.name: self._members(wanted, own) for wanted in self.types})
+        members = {wanted.name: self._members(wanted, own) for wanted in self.types}
+        return Symbols(self, members, tuple(every))
 
     def _members(self, wanted: Type, own: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
         """The symbols of a type: first its own, then those that are of it, too."""
@@ -69,65 +101,54 @@ class Domain:
         kinds = [wanted, *(other for other in others if other.is_a(wanted))]
         return tuple(name for kind in kinds for name in own.get(kind.name, ()))
 
+    def state(
+        self,
+        support: Mapping[str, str],
+        held: Mapping[str, str] | None = None,
+        facts: Iterable[Fact] = (),
+    ) -> State:
+        """A state: what everything that stands stands on, and the gripper of all that is held."""
+        standing, in_hand = sorted(support.items()), sorted((held or {}).items())
+        return State(tuple(standing), tuple(in_hand), tuple(sorted(facts)), self)
+
     def bind(self, action: Action) -> GroundInstruction:
         """What the action is by its declaration.
 
         Raises:
             InputError: the domain has no such instruction, or it takes other symbols.
         """
-        bound = self._bound.get(action)
-        if bound is None:
-            bound = self._bound[action] = self._bind(action)
-        return bound
+        return _bind(self, action)
 
-    @cached_property
-    def _bound(self) -> dict[Action, GroundInstruction]:
-        return {}
-
-    def _bind(self, action: Action) -> GroundInstruction:
-        self.check_action(action)
-        instruction = self.instruction(action.instruction)
-        assert instruction is not None
-        value = dict(zip(instruction.parameters, action.symbols, strict=True))
-        (effect,) = instruction.effect
-        return GroundInstruction(
-            action=action,
-            actor=action.symbols[0],
-            body=value[effect.body],
-            parent=value[effect.parent],
-            contact=tuple(_ground(term, value) for term in instruction.contact),
-            motion=tuple(_ground(step, value) for step in instruction.motion),
-        )
-
-    def instruction(self, name: str) -> Instruction | None:
-        """The instruction of a name."""
-        return next((known for known in self.instructions if known.name == name), None)
-
-    def goal_type(self, name: str) -> GoalType | None:
-        """The goal type of a name."""
-        return next((known for known in self.goal_types if known.name == name), None)
-
-    def check_action(self, action: Action) -> None:
-        """Check the name of an action and the number of its symbols.
+    def conditions(self, goal: Goal) -> tuple[GroundAtom, ...]:
+        """What must be true for a goal to hold.
 
         Raises:
-            InputError: they fit none of the instructions.
+            InputError: the domain has no such goal type, or it takes other symbols.
         """
-        known = self.instruction(action.instruction)
-        if known is None or len(known.parameters) != len(action.symbols):
-            accepted = signatures(self.instructions)
-            raise InputError(f"action {str(action)!r}", "is not an action", accepted)
+        return _conditions(self, goal)
 
-    def check_goal(self, goal: Goal) -> None:
-        """Check the name of a goal and the number of its symbols.
+    def instruction(self, action: Action) -> Instruction:
+        """The instruction of an action.
 
         Raises:
-            InputError: they fit none of the goal types.
+            InputError: the domain has no such instruction, or it takes other symbols.
         """
-        known = self.goal_type(goal.kind)
-        if known is None or len(known.parameters) != len(goal.symbols):
-            accepted = signatures(self.goal_types)
-            raise InputError(f"goal {str(goal)!r}", "is not a goal", accepted)
+        for known in self.instructions:
+            if known.name == action.instruction and _fits(known, action.symbols):
+                return known
+        accepted = signatures(self.instructions)
+        raise InputError(f"action {str(action)!r}", "is not an action", accepted)
+
+    def goal_type(self, goal: Goal) -> GoalType:
+        """The type of a goal.
+
+        Raises:
+            InputError: the domain has no such goal type, or it takes other symbols.
+        """
+        for known in self.goal_types:
+            if known.name == goal.kind and _fits(known, goal.symbols):
+                return known
+        raise InputError(f"goal {str(goal)!r}", "is not a goal", signatures(self.goal_types))
 
 
 def signatures(declared: Iterable[Instruction | GoalType]) -> str:
@@ -136,7 +157,41 @@ def signatures(declared: Iterable[Instruction | GoalType]) -> str:
     return ", ".join(f"({' '.join(names)})" for names in words)
 
 
-def _ground(term: Term, value: Mapping[Variable, str]) -> GroundTerm:
+def _fits(declared: Instruction | GoalType, symbols: tuple[str, ...]) -> bool:
+    return len(declared.parameters) == len(symbols)
+
+
+@cache
+def _bind(domain: Domain, action: Action) -> GroundInstruction:
+    instruction = domain.instruction(action)
+    value = dict(zip(instruction.parameters, action.symbols, strict=True))
+    (attached,) = [effect for effect in instruction.effect if isinstance(effect, Attach)]
+    facts = [effect for effect in instruction.effect if isinstance(effect, Atom)]
+    return GroundInstruction(
+        action=action,
+        actor=action.symbols[0],
+        body=value[attached.body],
+        parent=value[attached.parent],
+        into_hand=GRIPPER in attached.parent.type.kinds,
+        precondition=tuple(_ground_atom(atom, value) for atom in instruction.precondition),
+        facts=tuple(_ground_atom(atom, value) for atom in facts),
+        contact=tuple(_ground_term(term, value) for term in instruction.contact),
+        motion=tuple(_ground_term(step, value) for step in instruction.motion),
+    )
+
+
+@cache
+def _conditions(domain: Domain, goal: Goal) -> tuple[GroundAtom, ...]:
+    goal_type = domain.goal_type(goal)
+    value = dict(zip(goal_type.parameters, goal.symbols, strict=True))
+    return tuple(_ground_atom(atom, value) for atom in goal_type.condition)
+
+
+def _ground_atom(atom: Atom, value: Mapping[Variable, str]) -> GroundAtom:
+    return GroundAtom(atom.predicate, tuple(value[v] for v in atom.arguments), atom.negated)
+
+
+def _ground_term(term: Term, value: Mapping[Variable, str]) -> GroundTerm:
     options = {
         name: value[given] if isinstance(given, Variable) else given
         for name, given in term.options.items()

@@ -1,12 +1,15 @@
-"""Objectives: sets of goals, their enumeration for setup a, and their validation (DESIGN §2)."""
+"""Objectives: sets of goals, their enumeration, their lower bounds, and their validation."""
 
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Mapping
+from functools import lru_cache
 from itertools import combinations
 
 from guided_lgp.errors import InputError
 from guided_lgp.logic.actions import Goal
 from guided_lgp.logic.domain import signatures
-from guided_lgp.logic.state import State
+from guided_lgp.logic.grounding import all_goals, ground_instructions
+from guided_lgp.logic.state import GroundAtom, State
 from guided_lgp.logic.symbols import Symbols
 
 Objective = tuple[Goal, ...]
@@ -23,16 +26,82 @@ def unsatisfied(state: State, objective: Objective) -> Objective:
     return tuple(goal for goal in objective if not state.satisfies(goal))
 
 
-def least_actions(state: State, objective: Objective) -> int:
-    """A lower bound on the number of actions to an objective: those on its own boxes.
+def least_actions(state: State, objective: Objective, symbols: Symbols) -> float:
+    """A lower bound on the number of actions to an objective.
 
-    A box that must be held needs a grasp, one that must stand elsewhere a place, too, unless it is
-    in a gripper already. No action serves two boxes, and a box has one goal.
+    For every body that the goals speak of, the fewest changes of its parent until they hold, all
+    else left out of account. No action moves two bodies, so that these numbers add up.
+
+    Returns:
+        Infinity if a body can never get where it should be.
     """
-    return sum(
-        1 if goal.kind == "held" or state.holder(goal.box) is not None else 2
-        for goal in unsatisfied(state, objective)
+    if satisfied(state, objective):
+        return 0
+    wanted = _wanted_parents(objective, symbols)
+    changes = (
+        _changes_of_parent(symbols, body, parents).get(state.parent_of(body), math.inf)
+        for body, parents in wanted.items()
     )
+    return max(1, sum(changes))
+
+
+@lru_cache(maxsize=4096)
+def _wanted_parents(objective: Objective, symbols: Symbols) -> Mapping[str, frozenset[str]]:
+    """The parents that the goals leave to each body that they speak of."""
+    wanted: dict[str, frozenset[str]] = {}
+    for goal in objective:
+        for body, parents in parents_wanted_by(goal, symbols).items():
+            wanted[body] = wanted.get(body, parents) & parents
+    return wanted
+
+
+def parents_wanted_by(goal: Goal, symbols: Symbols) -> Mapping[str, frozenset[str]]:
+    """The parents that one goal leaves to the body that it speaks of, if it speaks of one."""
+    wanted = {}
+    for atom in symbols.domain.conditions(goal):
+        match atom:
+            case GroundAtom("on", (body, parent), False):
+                wanted[body] = frozenset({parent})
+            case GroundAtom("holds", (gripper, body), False):
+                wanted[body] = frozenset({gripper})
+            case GroundAtom("held", (body,), False):
+                wanted[body] = frozenset(symbols.grippers)
+    return wanted
+
+
+@lru_cache(maxsize=4096)
+def _changes_of_parent(symbols: Symbols, body: str, wanted: frozenset[str]) -> Mapping[str, int]:
+    """Fewest actions on a body until its parent is one of the wanted ones, from each parent."""
+    moves = [one for one in ground_instructions(symbols) if one.body == body]
+    steps = dict.fromkeys(wanted, 0)
+    for parent in (queue := list(wanted)):  # it grows on the way
+        for one in moves:
+            if one.parent == parent:
+                for before in symbols.names:
+                    if before not in steps and _may_leave(before, one.precondition, body, symbols):
+                        steps[before] = steps[parent] + 1
+                        queue.append(before)
+    return steps
+
+
+def _may_leave(
+    parent: str, precondition: tuple[GroundAtom, ...], body: str, symbols: Symbols
+) -> bool:
+    """Whether the body may hang on a parent, by what a precondition says of the two."""
+    in_hand = parent in symbols.grippers
+    for atom in precondition:
+        match atom:
+            case GroundAtom("held", (other,), negated) if other == body:
+                possible = in_hand != negated
+            case GroundAtom("holds", (gripper, other), negated) if other == body:
+                possible = (gripper == parent) != negated
+            case GroundAtom("on", (other, support), negated) if other == body:
+                possible = (support == parent) != negated
+            case _:
+                possible = True
+        if not possible:
+            return False
+    return True
 
 
 def format_objective(objective: Objective) -> str:
@@ -49,18 +118,6 @@ def parse_objective(goals: Iterable[str]) -> Objective:
     return tuple(dict.fromkeys(Goal.parse(text) for text in goals))
 
 
-def all_goals(symbols: Symbols) -> list[Goal]:
-    """Every goal over the symbols: held for each box, then on for each box and other table."""
-    held = [Goal("held", (box,)) for box in symbols.boxes]
-    on = [
-        Goal("on", (box, table))
-        for box in symbols.boxes
-        for table in symbols.tables
-        if table != box
-    ]
-    return held + on
-
-
 def one_goal_objectives(symbols: Symbols) -> list[Objective]:
     """All objectives of one goal (15 in setup a)."""
     return [(goal,) for goal in all_goals(symbols)]
@@ -68,25 +125,28 @@ def one_goal_objectives(symbols: Symbols) -> list[Objective]:
 
 def two_goal_objectives(symbols: Symbols) -> list[Objective]:
     """All unordered pairs of goals that do not contradict each other (72 in setup a)."""
-    return [pair for pair in combinations(all_goals(symbols), 2) if contradiction(pair) is None]
+    return [
+        pair for pair in combinations(all_goals(symbols), 2) if contradiction(pair, symbols) is None
+    ]
 
 
-def contradiction(objective: Objective) -> str | None:
+def contradiction(objective: Objective, symbols: Symbols) -> str | None:
     """Why the goals cannot all hold, or None if nothing speaks against them."""
-    place: dict[str, Goal] = {}
+    parents: dict[str, frozenset[str]] = {}
+    first: dict[str, Goal] = {}
     for goal in objective:
-        other = place.setdefault(goal.box, goal)
-        if other != goal:
-            return f"{other} and {goal} contradict each other: {goal.box} is in one place only"
-    for goal in place.values():
-        seen = [goal.box]
-        step: Goal | None = goal
-        while step is not None and step.kind == "on":
-            if step.table in seen:
+        for body, wanted in parents_wanted_by(goal, symbols).items():
+            other = first.setdefault(body, goal)
+            parents[body] = parents.get(body, wanted) & wanted
+            if not parents[body]:
+                return f"{other} and {goal} contradict each other: {body} is in one place only"
+    for body, goal in first.items():
+        chain = [body]
+        while (below := parents.get(chain[-1])) is not None and len(below) == 1:
+            (support,) = below
+            if support in chain:
                 return f"{goal} is part of a cycle: a box cannot stand on itself through others"
-            assert step.table is not None
-            seen.append(step.table)
-            step = place.get(step.table)
+            chain.append(support)
     return None
 
 
@@ -94,29 +154,41 @@ def validate_objective(objective: Objective, symbols: Symbols, state: State) -> 
     """Check an objective before any search.
 
     Raises:
-        InputError: unknown symbol, contradictory goals, more boxes held than grippers, or nothing
-            left to do.
+        InputError: unknown goal or symbol, contradictory goals, more to hold than grippers, or
+            nothing left to do.
     """
+    goal_types = symbols.domain.goal_types
     if not objective:
-        accepted = signatures(symbols.domain.goal_types)
-        raise InputError("goal", "none given", f"one or more of {accepted}")
+        raise InputError("goal", "none given", f"one or more of {signatures(goal_types)}")
     for goal in objective:
-        symbols.domain.check_goal(goal)
-        if goal.box not in symbols.boxes:
-            raise InputError(f"goal {goal}", f"unknown box {goal.box!r}", ", ".join(symbols.boxes))
-        if goal.kind == "on" and goal.table not in symbols.tables:
-            raise InputError(
-                f"goal {goal}", f"unknown table {goal.table!r}", ", ".join(symbols.tables)
-            )
-    fault = contradiction(objective)
+        _check_symbols(goal, symbols)
+    fault = contradiction(objective, symbols)
     if fault is not None:
         raise InputError("objective", fault)
-    held = sum(goal.kind == "held" for goal in objective)
-    if held > len(symbols.grippers):
-        raise InputError(
-            "objective",
-            f"{held} boxes to hold",
-            f"at most {len(symbols.grippers)}, one per gripper",
-        )
+    _check_hands(objective, symbols)
     if satisfied(state, objective):
         raise InputError("objective", f"{format_objective(objective)} already holds in the scene")
+
+
+def _check_symbols(goal: Goal, symbols: Symbols) -> None:
+    parameters = symbols.domain.goal_type(goal).parameters
+    for variable, name in zip(parameters, goal.symbols, strict=True):
+        kind = variable.type.name
+        if not symbols.is_a(name, kind):
+            accepted = ", ".join(symbols.of(kind))
+            raise InputError(f"goal {goal}", f"unknown {kind} {name!r}", accepted)
+
+
+def _check_hands(objective: Objective, symbols: Symbols) -> None:
+    """A gripper holds one thing; goals may ask for a certain one, or for an empty one."""
+    atoms = [atom for goal in objective for atom in symbols.domain.conditions(goal)]
+    empty = {name for atom in atoms if atom[::2] == ("free", False) for name in atom.symbols}
+    hands = frozenset(symbols.grippers) - empty
+    wanted = _wanted_parents(objective, symbols).values()
+    held = [parents & hands for parents in wanted if parents <= frozenset(symbols.grippers)]
+    if len(held) > len(hands):
+        limit = f"at most {len(hands)}, one per gripper"
+        raise InputError("objective", f"{len(held)} boxes to hold", limit)
+    named = [parents for parents in held if len(parents) == 1 < len(hands)]
+    if len(set(named)) < len(named) or frozenset() in held:
+        raise InputError("objective", "a gripper is to hold two things, or one while it is empty")

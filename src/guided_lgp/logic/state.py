@@ -1,50 +1,90 @@
-"""Symbolic states: what holds what and what stands on what."""
+"""Symbolic states: the mode tree, and what else is true."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, NamedTuple
 
 from guided_lgp.logic.actions import Goal
+
+if TYPE_CHECKING:
+    from guided_lgp.logic.domain import Domain
+
+Fact = tuple[str, ...]
+"""A predicate and its symbols."""
 
 
 @dataclass(frozen=True)
 class State:
-    """What holds what and what stands on what.
+    """A state of a domain: what hangs on what, and further facts; made by ``Domain.state``.
 
-    ``support`` maps every box that stands to what it stands on; ``held`` maps every box that is
-    held to its gripper. Both are sorted tuples of pairs, so that equal states compare equal.
+    Everything movable has one parent: ``support`` maps what stands to what it stands on, ``held``
+    what is held to its gripper. All are sorted, so that equal states compare equal.
     """
 
     support: tuple[tuple[str, str], ...]
-    held: tuple[tuple[str, str], ...] = ()
+    held: tuple[tuple[str, str], ...]
+    facts: tuple[Fact, ...]
+    domain: "Domain" = field(compare=False, repr=False)
 
-    @classmethod
-    def of(cls, support: Mapping[str, str], held: Mapping[str, str] | None = None) -> "State":
-        """Build a state from dictionaries."""
-        return cls(tuple(sorted(support.items())), tuple(sorted((held or {}).items())))
-
-    def holder(self, box: str) -> str | None:
-        """The gripper that holds the box, if any."""
-        return next((gripper for held, gripper in self.held if held == box), None)
+    def holder(self, body: str) -> str | None:
+        """The gripper that holds the body, if any."""
+        return next((gripper for held, gripper in self.held if held == body), None)
 
     def held_by(self, gripper: str) -> str | None:
-        """The box that the gripper holds, if any."""
-        return next((box for box, holder in self.held if holder == gripper), None)
+        """The body that the gripper holds, if any."""
+        return next((body for body, holder in self.held if holder == gripper), None)
 
-    def support_of(self, box: str) -> str | None:
-        """What the box stands on; None while it is held."""
-        return next((table for standing, table in self.support if standing == box), None)
+    def support_of(self, body: str) -> str | None:
+        """What the body stands on; None while it is held."""
+        return next((support for standing, support in self.support if standing == body), None)
 
-    def standing_on(self, table: str) -> tuple[str, ...]:
-        """The boxes that stand directly on a table or box, sorted."""
-        return tuple(box for box, support in self.support if support == table)
+    def parent_of(self, body: str) -> str:
+        """What the body hangs on: its support or gripper."""
+        return dict(self.support + self.held)[body]
 
-    def carried_by(self, table: str) -> tuple[str, ...]:
-        """The boxes that stand on a table or box directly or through others."""
-        direct = self.standing_on(table)
-        return direct + tuple(box for below in direct for box in self.carried_by(below))
+    def children_of(self, parent: str) -> tuple[str, ...]:
+        """What stands directly on a support or is in a gripper, sorted."""
+        return tuple(body for body, above in self.support + self.held if above == parent)
+
+    def standing_on(self, support: str) -> tuple[str, ...]:
+        """The bodies that stand directly on a table or body, sorted."""
+        return tuple(body for body, below in self.support if below == support)
+
+    def carried_by(self, support: str) -> tuple[str, ...]:
+        """The bodies that stand on a table or body directly or through others."""
+        direct = self.standing_on(support)
+        return direct + tuple(body for below in direct for body in self.carried_by(below))
 
     def satisfies(self, goal: Goal) -> bool:
         """Whether the goal holds in this state."""
-        if goal.kind == "held":
-            return self.holder(goal.box) is not None
-        return self.support_of(goal.box) == goal.table
+        return all(atom.holds_in(self) for atom in self.domain.conditions(goal))
+
+
+class GroundAtom(NamedTuple):
+    """A statement about a state, or its negation, with symbols in place of variables."""
+
+    predicate: str
+    symbols: tuple[str, ...]
+    negated: bool
+
+    def __abs__(self) -> "GroundAtom":
+        """The same without negation."""
+        return self._replace(negated=False)
+
+    def holds_in(self, state: State) -> bool:
+        """Whether it is true in a state."""
+        test = _PREDICATES.get(self.predicate)
+        fact = (self.predicate, *self.symbols)
+        return (fact in state.facts if test is None else test(state, *self.symbols)) != self.negated
+
+
+_PREDICATES: Mapping[str, Callable[..., bool]] = {
+    "holds": lambda state, gripper, body: state.holder(body) == gripper,
+    "held": lambda state, body: state.holder(body) is not None,
+    "free": lambda state, gripper: state.held_by(gripper) is None,
+    "on": lambda state, body, support: state.support_of(body) == support,
+    "clear": lambda state, support: not state.children_of(support),
+    "carries": lambda state, body, other: other == body or other in state.carried_by(body),
+    "same": lambda state, one, other: one == other,
+}
+"""What the mode tree says; every other predicate is a fact of the domain."""

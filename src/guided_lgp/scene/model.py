@@ -154,7 +154,7 @@ class Scene(_Document):
     @property
     def state(self) -> State:
         """The initial symbolic state."""
-        return State.of({box.name: box.on for box in self.boxes})
+        return load_domain().state({box.name: box.on for box in self.boxes})
 
     @model_validator(mode="after")
     def _names(self) -> "Scene":

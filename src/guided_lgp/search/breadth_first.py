@@ -2,7 +2,7 @@
 
 from guided_lgp.search.problem import Problem
 from guided_lgp.search.result import Run, SearchResult
-from guided_lgp.search.tree import GoalStates, LogicTree
+from guided_lgp.search.tree import LogicTree
 
 
 def plan(problem: Problem) -> SearchResult:
@@ -13,7 +13,7 @@ def plan(problem: Problem) -> SearchResult:
     """
     run = Run(problem)
     tree = LogicTree(problem.symbols, problem.scene.state)
-    goals = GoalStates(tree.space, problem.objective)
+    goals = tree.space.goal_states(problem.objective)
     node = 0
     while node < len(tree):
         if limit := run.limit_reached(len(tree)):

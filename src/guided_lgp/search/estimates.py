@@ -52,13 +52,13 @@ class PolicyEstimate:
     """
 
     def __init__(self, problem: Problem) -> None:
-        self._objective = problem.objective
+        self._objective, self._symbols = problem.objective, problem.symbols
         self._visits: Counter[State] = Counter()
 
     def rank(self, node: Node) -> Rank:
         """See :class:`Estimate`."""
         depth = len(node.skeleton)
-        length = depth + least_actions(node.state, self._objective)
+        length = depth + least_actions(node.state, self._objective, self._symbols)
         cost = -node.discrepancy + DETOUR * length + REVISIT * self._visits[node.state]
         return cost, -depth
 
@@ -80,7 +80,7 @@ class LandmarkEstimate:
     def __init__(self, problem: Problem) -> None:
         self._symbols = problem.symbols
         operators = relaxed_operators(problem.symbols)
-        self._landmark_cut = LandmarkCut(goal_facts(problem.objective), operators)
+        self._landmark_cut = LandmarkCut(goal_facts(problem.objective, problem.symbols), operators)
         self._known: dict[State, float] = {}
 
     def rank(self, node: Node) -> Rank:

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from guided_lgp.logic import Objective, Skeleton
 from guided_lgp.search.problem import Problem
 from guided_lgp.search.result import Run, SearchResult
-from guided_lgp.search.tree import GoalStates, StateSpace, distances
+from guided_lgp.search.tree import StateSpace, distances
 
 
 def plan(problem: Problem) -> SearchResult:
@@ -40,7 +40,7 @@ class _Graph:
     def __init__(self, space: StateSpace, objective: Objective, max_size: int) -> None:
         self._space = space
         self._objective = objective
-        self._goals = GoalStates(space, objective)
+        self._goals = space.goal_states(objective)
         self._max_size = max_size
         self._expanded = 0
         self._goal_found = False
@@ -49,16 +49,16 @@ class _Graph:
 
     @property
     def size(self) -> int:
-        return len(self._space.states) + self._sequence_nodes
+        return len(self._space) + self._sequence_nodes
 
     def expand_layer(self) -> int:
         """Expand the states found last, up to the limit of the size; how many they were."""
-        layer = range(self._expanded, len(self._space.states))
+        layer = range(self._expanded, len(self._space))
         for state in layer:
             if self.size >= self._max_size:
                 break
-            transitions = self._space.transitions(state)
-            self._goal_found |= any(target in self._goals for _, target in transitions)
+            targets = self._space.targets(state)
+            self._goal_found |= any(target in self._goals for target in targets)
             self._expanded += 1
         return self._expanded - layer.start
 

@@ -3,7 +3,8 @@
 import math
 from collections.abc import Iterable, Iterator
 
-from guided_lgp.logic.strips import Fact, RelaxedOperator
+from guided_lgp.logic.state import Fact
+from guided_lgp.logic.strips import RelaxedOperator
 
 _GOAL: Fact = ("goal",)
 _UNREACHED = -1

@@ -6,17 +6,10 @@ Equal states are stored once, so that a node costs three integers: breadth-first
 
 from array import array
 from collections import deque
+from collections.abc import Callable, Sequence
 
-from guided_lgp.logic import (
-    Action,
-    Objective,
-    Skeleton,
-    State,
-    Symbols,
-    applicable_actions,
-    satisfied,
-    successor,
-)
+from guided_lgp.logic import Action, Objective, Skeleton, State, Symbols
+from guided_lgp.logic.packed import packed_states
 
 Transition = tuple[Action, int]
 """An applicable action and the number of the state it leads to."""
@@ -26,62 +19,83 @@ class StateSpace:
     """Symbolic states, numbered as they are discovered, and their transitions."""
 
     def __init__(self, symbols: Symbols, start: State) -> None:
-        self._symbols = symbols
-        self._number = {start: 0}
-        self.states = [start]
-        self.expanded: dict[int, tuple[Transition, ...]] = {}
-        """Transitions out of the states that were expanded."""
+        self._packing = packed_states(symbols)
+        self._packed = [self._packing.pack(start)]
+        self._number = {self._packed[0]: 0}
+        self.expanded: dict[int, list[int]] = {}
+        """Where the transitions out of the states that were expanded lead to."""
+
+    def __len__(self) -> int:
+        return len(self._packed)
+
+    def state(self, number: int) -> State:
+        """The state of a number."""
+        return self._packing.unpack(self._packed[number])
+
+    def targets(self, state: int) -> list[int]:
+        """Where the transitions out of a state lead to, in the fixed order of the logic tree."""
+        known = self.expanded.get(state)
+        if known is None:
+            packed = self._packed[state]
+            known = self.expanded[state] = self._discover(
+                self._packing.moves(packed).targets(packed)
+            )
+        return known
+
+    def actions(self, state: int) -> tuple[Action, ...]:
+        """The actions of the transitions out of a state, in the same order."""
+        return self._packing.moves(self._packed[state]).actions
 
     def transitions(self, state: int) -> tuple[Transition, ...]:
         """All transitions out of a state, in the fixed order of the logic tree."""
-        known = self.expanded.get(state)
-        if known is None:
-            origin = self.states[state]
-            known = tuple(
-                (action, self._discover(successor(origin, action)))
-                for action in applicable_actions(origin, self._symbols)
-            )
-            self.expanded[state] = known
-        return known
+        return tuple(zip(self.actions(state), self.targets(state), strict=True))
 
-    def _discover(self, state: State) -> int:
-        number = self._number.setdefault(state, len(self.states))
-        if number == len(self.states):
-            self.states.append(state)
-        return number
+    def _discover(self, found: list[int]) -> list[int]:
+        """The numbers of packed states; new ones are appended."""
+        numbers = []
+        for packed in found:
+            number = self._number.setdefault(packed, len(self._packed))
+            if number == len(self._packed):
+                self._packed.append(packed)
+            numbers.append(number)
+        return numbers
 
     def explore(self) -> None:
         """Discover every reachable state; their number is finite and small."""
-        for state, _ in enumerate(self.states):  # the list grows on the way
-            self.transitions(state)
+        for state, _ in enumerate(self._packed):  # the list grows on the way
+            self.targets(state)
+
+    def goal_states(self, objective: Objective) -> "GoalStates":
+        """The states that satisfy an objective."""
+        return GoalStates(self._packed, self._packing.goal_test(objective))
 
 
 class GoalStates:
-    """The numbers of the states that satisfy an objective."""
+    """The numbers of the states that pass a test."""
 
-    def __init__(self, space: StateSpace, objective: Objective) -> None:
-        self._states = space.states
-        self._objective = objective
+    def __init__(self, packed: Sequence[int], test: Callable[[int], bool]) -> None:
+        self._packed = packed
+        self._test = test
         self._holds: list[bool] = []
 
     def __contains__(self, state: int) -> bool:
         while len(self._holds) <= state:
-            self._holds.append(satisfied(self._states[len(self._holds)], self._objective))
+            self._holds.append(self._test(self._packed[len(self._holds)]))
         return self._holds[state]
 
 
 def distances(space: StateSpace, objective: Objective) -> dict[int, int]:
     """Least number of actions to the objective, from every state that is known to reach it."""
-    predecessors: dict[int, list[int]] = {}
-    for state, transitions in space.expanded.items():
-        for _, target in transitions:
-            predecessors.setdefault(target, []).append(state)
-    goals = GoalStates(space, objective)
-    distance = {state: 0 for state, _ in enumerate(space.states) if state in goals}
+    predecessors: list[list[int]] = [[] for _ in range(len(space))]
+    for state, targets in space.expanded.items():
+        for target in targets:
+            predecessors[target].append(state)
+    goals = space.goal_states(objective)
+    distance = {state: 0 for state in range(len(space)) if state in goals}
     queue = deque(distance)
     while queue:
         state = queue.popleft()
-        for predecessor in predecessors.get(state, ()):
+        for predecessor in predecessors[state]:
             if predecessor not in distance:
                 distance[predecessor] = distance[state] + 1
                 queue.append(predecessor)
@@ -104,7 +118,7 @@ class LogicTree:
     def expand(self, node: int) -> range:
         """Generate the children of a node."""
         first = len(self.state)
-        targets = [target for _, target in self.space.transitions(self.state[node])]
+        targets = self.space.targets(self.state[node])
         self.state.extend(targets)
         self._parent.extend([node] * len(targets))
         self._rank.extend(range(len(targets)))
@@ -115,6 +129,6 @@ class LogicTree:
         actions: list[Action] = []
         while node:
             parent = self._parent[node]
-            actions.append(self.space.transitions(self.state[parent])[self._rank[node]][0])
+            actions.append(self.space.actions(self.state[parent])[self._rank[node]])
             node = parent
         return tuple(reversed(actions))

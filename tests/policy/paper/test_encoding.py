@@ -8,13 +8,13 @@ from guided_lgp.policy.paper.encoding import NOWHERE, Encoding
 
 ENCODING = Encoding()
 FIVE_BOXES = Encoding(slots=(("gripper", 2), ("box", 5), ("table", 2)))
-ON_TABLES = State.of({"red": "tab1", "green": "tab1", "blue": "tab2"})
+ON_TABLES = load_domain().state({"red": "tab1", "green": "tab1", "blue": "tab2"})
 MANY = load_domain().symbols(
     gripper=("pr2L", "pr2R"),
     box=("red", "green", "blue", "pink", "grey"),
     table=("tab1", "tab2", "tray"),
 )
-ON_TAB1 = State.of(dict.fromkeys(MANY.boxes, "tab1"))
+ON_TAB1 = load_domain().state(dict.fromkeys(MANY.boxes, "tab1"))
 
 
 def test_sizes() -> None:
@@ -75,7 +75,7 @@ def test_actions_by_hand(symbols: Symbols, action: str, classes: tuple[int, ...]
 
 
 def test_what_fits_stays_as_it_is(symbols: Symbols) -> None:
-    state = State.of({"red": "tab1", "green": "tab1"}, {"blue": "pr2R"})
+    state = load_domain().state({"red": "tab1", "green": "tab1"}, {"blue": "pr2R"})
     objective = parse_objective(["(on blue green)", "(on green tab2)"])
     slots = ENCODING.fill(objective, state, symbols)
     assert slots.goals == objective
@@ -90,19 +90,19 @@ def test_of_many_goals_two_unsatisfied_ones_supports_first() -> None:
     assert slots.goals == parse_objective(["(on blue tray)", "(on green blue)"])
     assert slots.of(["box"]) == ("blue", "green", "red")
 
-    later = State.of({**dict(ON_TAB1.support), "blue": "tray", "green": "blue"})
+    later = load_domain().state({**dict(ON_TAB1.support), "blue": "tray", "green": "blue"})
     assert ENCODING.fill(objective, later, MANY).goals == parse_objective(["(on red green)"])
 
 
 def test_goals_that_name_more_than_three_boxes_become_one_goal() -> None:
     objective = parse_objective(["(on red green)", "(on blue pink)"])
     assert ENCODING.fill(objective, ON_TAB1, MANY).goals == objective[:1]
-    later = State.of({**dict(ON_TAB1.support), "red": "green"})
+    later = load_domain().state({**dict(ON_TAB1.support), "red": "green"})
     assert ENCODING.fill(objective, later, MANY).goals == objective[1:]
 
 
 def test_boxes_of_the_goals_then_held_ones_then_others() -> None:
-    state = State.of(
+    state = load_domain().state(
         {"red": "tab1", "green": "tab1", "blue": "tab1", "pink": "tab1"}, {"grey": "pr2L"}
     )
     objective = parse_objective(["(on pink tray)"])
@@ -128,7 +128,7 @@ def test_tables_of_the_goals_first(goals: list[str], surfaces: tuple[str, ...]) 
 
 def test_slots_without_a_symbol_are_empty_and_zero() -> None:
     symbols = load_domain().symbols(gripper=("pr2L", "pr2R"), box=("red",), table=("tab1",))
-    state = State.of({"red": "tab1"})
+    state = load_domain().state({"red": "tab1"})
     slots = ENCODING.fill(parse_objective(["(held red)"]), state, symbols)
     assert slots.symbols == ("pr2L", "pr2R", "red", None, None, "tab1", None)
     positions = {name: np.ones(3) for name in ("pr2L", "pr2R", "red", "tab1")}
@@ -141,7 +141,7 @@ def test_normalised_positions_by_hand() -> None:
         gripper=("pr2L", "pr2R"), box=("red", "green"), table=("tab1", "tab2")
     )
     encoding = Encoding(centre=(0.5, 0.0, 1.0) * 7, scale=(2.0, 1.0, 0.5) * 7)
-    slots = encoding.fill((), State.of({"red": "tab1", "green": "tab1"}), symbols)
+    slots = encoding.fill((), load_domain().state({"red": "tab1", "green": "tab1"}), symbols)
     positions = {name: np.array([2.5, 1.0, 0.0]) for name in slots.symbols if name}
     code = encoding.encode_state(slots, ON_TABLES, positions).reshape(7, 3)
     assert code[[0, 1, 2, 3, 5, 6]].tolist() == [[1, 1, -2]] * 6
@@ -188,7 +188,9 @@ def test_named_boxes_fill_the_first_slots(symbols: Symbols) -> None:
 
     assert boxes("(on blue grey)") == ("blue", "grey", "red")
     assert boxes("(held grey)", "(on green tray)") == ("grey", "green", "red")
-    held = State.of({box: "tab1" for box in MANY.boxes if box != "pink"}, {"pink": "pr2L"})
+    held = load_domain().state(
+        {box: "tab1" for box in MANY.boxes if box != "pink"}, {"pink": "pr2L"}
+    )
     assert boxes("(on blue tab2)", state=held) == ("blue", "pink", "red")
     fewer = load_domain().symbols(
         gripper=symbols.grippers, box=("red", "green"), table=symbols.surfaces
@@ -199,7 +201,7 @@ def test_named_boxes_fill_the_first_slots(symbols: Symbols) -> None:
 
 def test_what_the_state_means_by_hand(symbols: Symbols) -> None:
     encoding = Encoding(symbolic_state=True)
-    state = State.of({"red": "tray", "green": "red"}, {"blue": "pr2R"})
+    state = load_domain().state({"red": "tray", "green": "red"}, {"blue": "pr2R"})
     three = load_domain().symbols(gripper=MANY.grippers, box=MANY.boxes[:3], table=MANY.surfaces)
     slots = encoding.fill(parse_objective(["(held blue)", "(on red tab1)"]), state, three)
     assert encoding.encode_supports(slots, state) == (NOWHERE, 2, -2), "the tray has no slot"

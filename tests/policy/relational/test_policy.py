@@ -49,7 +49,7 @@ def draw(boxes: int, tables: int, goals: int, seed: int) -> Problem:
         box=[f"box{index}" for index in range(boxes)],
         table=[f"tab{index}" for index in range(tables)],
     )
-    state = State.of({box: str(rng.choice(symbols.surfaces)) for box in symbols.boxes})
+    state = load_domain().state({box: str(rng.choice(symbols.surfaces)) for box in symbols.boxes})
     for _ in range(int(rng.integers(6))):
         actions = list(applicable_actions(state, symbols))
         state = successor(state, actions[rng.integers(len(actions))])
@@ -72,7 +72,7 @@ def renamed(problem: Problem, names: dict[str, str]) -> Problem:
     positions = {new(name): position for name, position in problem.positions.items()}
     return Problem(
         tuple(Goal(g.kind, tuple(map(new, g.symbols))) for g in problem.objective),
-        State.of(
+        load_domain().state(
             {new(box): new(table) for box, table in problem.state.support},
             {new(box): new(gripper) for box, gripper in problem.state.held},
         ),

@@ -134,12 +134,11 @@ class Signature:
 
     def arguments(self, named: Action | Goal) -> Mapping[str, str]:
         """The symbols of an action or goal by the names of the parameters."""
-        declared: Instruction | GoalType | None
+        declared: Instruction | GoalType
         if isinstance(named, Action):
-            declared = self.domain.instruction(named.instruction)
+            declared = self.domain.instruction(named)
         else:
-            declared = self.domain.goal_type(named.kind)
-        assert declared is not None
+            declared = self.domain.goal_type(named)
         return dict(zip((v.name for v in declared.parameters), named.symbols, strict=True))
 
 
