@@ -103,6 +103,8 @@ def test_the_wheel_plans_views_and_writes_a_page_from_an_empty_folder(
     assert "weights shipped with" in planned.stdout
     assert json.loads((tmp_path / "plan.json").read_text())["actions"]
     assert "<script" in (tmp_path / "plan.html").read_text()
+    exported = run(environment, "guided-lgp", "export", "plan.json", "motion.csv", cwd=tmp_path)
+    assert exported.stdout == "written: motion.csv\n"
     assert "error" not in run(environment, "guided-lgp", "doctor", cwd=tmp_path).stderr
 
 

@@ -320,6 +320,34 @@ def examples(
         typer.echo(scene)
 
 
+@app.command()
+def export(
+    plan_file: Annotated[
+        Path, typer.Argument(metavar="PLAN", help="A plan written by plan --out.")
+    ],
+    out: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE",
+            help="FILE.json: JointTrajectory messages, one per action; FILE.csv: a row per point; "
+            "no suffix: a folder with a ROS 2 bag.",
+        ),
+    ],
+    speed: Annotated[
+        float, typer.Option(metavar="SHARE", help="Share of the robot's speed, in (0, 1].")
+    ] = 1.0,
+) -> None:
+    """Write a plan's motion for a robot's trajectory controllers.
+
+    Example: guided-lgp export plan.json motion.csv --speed 0.5
+    """
+    from guided_lgp.bounds.plan_file import read_plan
+    from guided_lgp.export import export_plan
+
+    export_plan(read_plan(plan_file), out, speed)
+    typer.echo(f"written: {out}")
+
+
 class Format(StrEnum):
     """Files that have a JSON Schema."""
 
@@ -605,12 +633,23 @@ def end_with_dvc() -> None:
         parallel.end_with_parent(os.getppid(), signal.SIGTERM)
 
 
+_EXTRAS = {
+    "PIL": "view",
+    "dask": "cluster",
+    "distributed": "cluster",
+    "gymnasium": "gym",
+    "rosbags": "ros",
+    "viser": "view",
+}
+"""The extra that brings a package, where it is not ``pipeline``."""
+
+
 def _missing(error: ModuleNotFoundError) -> Exception:
     """What to install for a package that the core goes without; a module of our own is a fault."""
     package = (error.name or "").partition(".")[0]
     if package in ("", "guided_lgp"):
         return error
-    extra = {"viser": "view", "dask": "cluster", "distributed": "cluster"}.get(package, "pipeline")
+    extra = _EXTRAS.get(package, "pipeline")
     return InputError(
         f"package {package}", "is not installed", f"pip install 'guided-lgp[{extra}]'"
     )

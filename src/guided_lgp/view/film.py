@@ -10,7 +10,6 @@ from guided_lgp.bounds.results import Trajectory
 from guided_lgp.documents import written_whole
 from guided_lgp.poses import Array
 from guided_lgp.scene.model import Scene
-from guided_lgp.scene.pr2 import ARM_JOINTS, FINGER_JOINTS, FINGER_LIMITS, tool_pose
 from guided_lgp.scene.world import Camera, World
 from guided_lgp.view.replay import play
 
@@ -26,19 +25,19 @@ class _Stage:
     def __init__(self, scene: Scene, world: World) -> None:
         self.scene = scene
         self._world = world
-        self._q: Array = np.zeros(len(ARM_JOINTS))
+        self._q: Array = scene.robot.description.home
         self._fingers: dict[str, float] = {}
 
     def configure(self, joints: Mapping[str, float]) -> None:
-        self._q = np.array([joints[name] for name in ARM_JOINTS])
-        self._fingers = {
-            gripper: joints.get(names[0], FINGER_LIMITS[1])
-            for gripper, names in FINGER_JOINTS.items()
-        }
+        robot = self.scene.robot.description
+        self._q = np.array([joints[name] for name in robot.joint_names])
+        self._fingers = robot.finger_values(
+            np.array([joints[name] for name in robot.moving_joints])
+        )
         self._world.set(self._q, {}, self._fingers)
 
     def tool_pose(self, gripper: str) -> Array:
-        return tool_pose(self.scene, self._q, gripper)
+        return self.scene.robot.tool_pose(self._q, gripper)
 
     def move_box(self, name: str, box_pose: Array) -> None:
         self._world.set(self._q, {name: box_pose}, self._fingers)
