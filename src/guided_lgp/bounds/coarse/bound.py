@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from guided_lgp.bounds.coarse.decoding import Decoder
+from guided_lgp.bounds.coarse.facts import Facts
 from guided_lgp.bounds.coarse.formulation import Formulation, Formulator
 from guided_lgp.bounds.coarse.solver import Settings, Solution, Solver, default_solver
 from guided_lgp.bounds.coarse.starts import Starts
@@ -42,6 +43,7 @@ class CoarseBound:
         self._restarts = restarts
         self._solver = solver or default_solver(scene.robot.description)
         self._geometry = SceneGeometry(scene)
+        self._facts = Facts(self._geometry)
         self._starts = Starts(self._geometry, self._solver)
         self._decoder = Decoder(self._geometry)
         self._settings = Settings()
@@ -87,7 +89,10 @@ class CoarseBound:
                 return
 
     def _search(self, skeleton: Skeleton, prefix: CoarseSolution | None) -> CoarseSolution:
-        """Start after start until one leads to a verified solution."""
+        """Start after start until one leads to a verified solution, unless a fact forbids it."""
+        if fact := self._facts.impossible(skeleton):
+            failure = Failure(len(skeleton) - 1, str(fact), np.nan, _PROVED)
+            return CoarseSolution(skeleton, feasible=False, failure=failure, restarts=0)
         programs = _Programs(self._geometry, skeleton)
         failures: list[Failure] = []
         for number in range(self._restarts):
@@ -177,6 +182,9 @@ class _Programs:
             self._built[index] = Formulator(self._geometry, _MARGINS[index]).build(self.skeleton)
         return self._built[index]
 
+
+_PROVED = "proved for the arm alone, collisions left out"
+"""What was tried where a fact says no."""
 
 _NOISE = 0.3
 """Spread of the choices in all starts but the first."""

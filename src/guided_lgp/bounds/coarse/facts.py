@@ -1,0 +1,124 @@
+"""Facts: what single arms cannot do in a scene, whatever else happens; each is proved once.
+
+A fact is about one arm and one box: the box where it stands at the start, or anywhere on a support
+that has not moved. It says "impossible" only where that is so without all other bodies; then every
+sequence with such an action is infeasible.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from guided_lgp.bounds.coarse.formulation import straight_lines
+from guided_lgp.bounds.coarse.reach import Grasp, Limb
+from guided_lgp.bounds.program.context import Line
+from guided_lgp.bounds.program.geometry import SceneGeometry
+from guided_lgp.bounds.program.kinematics import kinematics_of
+from guided_lgp.bounds.results import Array
+from guided_lgp.bounds.terms.hold import PAD_MARGIN, PALM_GAP
+from guided_lgp.bounds.terms.pads import PAD_CENTRE
+from guided_lgp.logic import Skeleton, successor
+from guided_lgp.logic.domain import GroundInstruction
+
+
+@dataclass(frozen=True)
+class Hold:
+    """A gripper holds a standing box and can move along straight lines, alone or with the box."""
+
+    gripper: str
+    box: str
+    support: str | None
+    """Where the box is: anywhere on a support at its start, or (None) at its own start."""
+    lines: tuple[Line, ...]
+
+    def __str__(self) -> str:
+        return f"reach {self.gripper} {self.box}"
+
+
+class Facts:
+    """The facts of one scene."""
+
+    def __init__(self, geometry: SceneGeometry) -> None:
+        robot = geometry.scene.robot
+        self._geometry = geometry
+        self._arms = kinematics_of(robot.description).arms
+        self._limbs = {name: Limb.of(arm, robot.fixed_values) for name, arm in self._arms.items()}
+        self._known: dict[Hold, bool] = {}
+
+    def impossible(self, skeleton: Skeleton) -> Hold | None:
+        """What makes the last action of a skeleton impossible, as far as facts go."""
+        return next(filter(self.out_of_reach, self._holds(skeleton)), None)
+
+    def out_of_reach(self, hold: Hold) -> bool:
+        """Whether the arm cannot do it, collisions aside; boxes too wide for the fingers aside."""
+        if hold not in self._known:
+            limb = self._limbs[hold.gripper]
+            self._known[hold] = limb is not None and limb.cannot(self._grasp(hold))
+        return self._known[hold]
+
+    def _holds(self, skeleton: Skeleton) -> Iterator[Hold]:
+        """What the last action asks of its arms, where it is known where its body stands."""
+        *before, last = map(self._geometry.scene.symbols.domain.bind, skeleton)
+        moved, loaded = self._moved(before, last.body)
+        if last.parent in self._arms:
+            support, known = moved.get(last.body), moved.get(last.body, "") is not None
+        else:
+            support, known = last.parent, not loaded and last.parent not in moved
+        for term in last.contact if known else ():
+            if term.name == "hold" and term.symbols[1] == last.body:
+                gripper = term.symbols[0]
+                lines = straight_lines(last.motion)
+                own = tuple(line for line in lines if line.gripper == gripper)
+                yield Hold(gripper, last.body, support, own)
+
+    def _moved(
+        self, before: Sequence[GroundInstruction], body: str
+    ) -> tuple[dict[str, str | None], bool]:
+        """Where actions bring what they move, and whether a body carries others after them.
+
+        Returns:
+            the support of what was put alone on one that has not moved, or None; and the answer.
+        """
+        state = self._geometry.scene.state
+        moved: dict[str, str | None] = {}
+        for ground in before:
+            carried = state.carried_by(ground.body)
+            alone = not carried and ground.parent not in moved and ground.parent not in self._arms
+            moved |= dict.fromkeys(carried)
+            moved[ground.body] = ground.parent if alone else None
+            state = successor(state, ground.action)
+        return moved, bool(state.carried_by(body))
+
+    def _grasp(self, hold: Hold) -> Grasp:
+        """All grasps of the box there, with every value of the arm's first joint."""
+        turn, half_length, _ = self._geometry.grasp_side(hold.box)
+        half_height = self._geometry.bodies[hold.box].half[2]
+        slide = max(half_length, half_height) - PAD_MARGIN
+        low, high, height = self._region(hold)
+        arm, limb = self._arms[hold.gripper], self._limbs[hold.gripper]
+        assert limb is not None
+        return Grasp(
+            low=np.array([*low[:2], low[2] + turn, 0.0, -slide, limb.limits[0, 0]]),
+            high=np.array([*high[:2], high[2] + turn, np.pi, slide, limb.limits[0, 1]]),
+            height=height,
+            half_length=half_length,
+            half_height=half_height,
+            depth=arm.chain.palm_front + PALM_GAP,
+            inner=(half_length - PAD_MARGIN, half_height - PAD_MARGIN),
+            pad=-PAD_CENTRE,
+            ends=((0.0, 0.0), *((line.back, line.up) for line in hold.lines)),
+        )
+
+    def _region(self, hold: Hold) -> tuple[Array, Array, float]:
+        """Least and greatest x, y and yaw of the box, and the height of its centre."""
+        x, y, yaw, z = self._geometry.poses[hold.support or hold.box]
+        if hold.support is None:
+            place = np.array([x, y, yaw])
+            return place, place, z
+        hx, hy, hz = self._geometry.bodies[hold.support].half
+        cosine, sine = abs(np.cos(yaw)), abs(np.sin(yaw))
+        half = np.array([cosine * hx + sine * hy, sine * hx + cosine * hy, np.pi / 2])
+        # turned by half a turn, the same grasps come from the box's other end
+        centre = np.array([x, y, 0.0])
+        return centre - half, centre + half, z + hz + self._geometry.bodies[hold.box].half[2]
