@@ -7,10 +7,14 @@ has one of them nearly (a wrist with an offset of a centimetre) is solved as if 
 Newton's method closes the gap; one that has none is solved by Newton's method from fixed starts.
 """
 
+from functools import cache
+
 import numpy as np
 from numpy.typing import NDArray
 
-from guided_lgp.robots.chain import Array, Chain
+from guided_lgp.poses import rotation_matrix
+from guided_lgp.robots.chain import Array, Chain, read_chain
+from guided_lgp.robots.robot import Robot
 from guided_lgp.robots.solvers import EXACT, Problem, best_solver, free_screws
 from guided_lgp.robots.structures import Structure, closest
 
@@ -105,6 +109,13 @@ class InverseKinematics:
             path.append(near[nearest])
         return np.array(path)
 
+    def redundancies(self, count: int) -> Array:
+        """Values (rad) of the redundant joint over its range; one zero where there is none."""
+        if self.problem.redundant is None:
+            return np.zeros(1)
+        low, high = np.clip(self._limits[self.problem.redundant], -np.pi, np.pi)
+        return np.linspace(low, high, count + 2)[1:-1]
+
     def forward(self, q: Array) -> tuple[Array, Array]:
         """Rotation (..., 3, 3) and origin (..., 3) of the tool frame for joints (..., n)."""
         return self.chain.forward(q)
@@ -115,6 +126,24 @@ class InverseKinematics:
         low, high = self._limits.T
         q = q + np.where(q < low, _TURN, 0.0)
         return np.asarray(q - np.where((q > high) & (q - _TURN >= low), _TURN, 0.0))
+
+
+@cache
+def inverse_kinematics(robot: Robot, gripper: str, fixed: tuple[float, ...]) -> InverseKinematics:
+    """The solver of a robot's arm, in the frame of its base link.
+
+    Args:
+        robot: whose arm it is.
+        gripper: which one.
+        fixed: values (rad or m) of the joints that the scene sets, in the robot's order.
+    """
+    arm = robot.arms[gripper]
+    joints = (joint.joint for joint in robot.fixed_joints.values())
+    values = dict(zip(joints, fixed, strict=True))
+    chain = read_chain(robot.urdf, robot.base_link, arm.tool_link, arm.joints, values)
+    tool = arm.tool_in_link
+    chain = chain.extended(rotation_matrix(tool[3:]), tool[:3])
+    return InverseKinematics(chain, arm.limits, arm.redundant, arm.home)
 
 
 def _problem(chain: Chain, limits: Array, redundant: int | None) -> Problem:

@@ -18,7 +18,9 @@ def _source(robot: Robot) -> str:
     table, reach = kernel_table(kinematics), reach_function(kinematics)
     generator = ca.CodeGenerator("kernels", {"casadi_int": "int", "with_header": False})
     functions = [f for kernel in table for f in (kernel.residual, kernel.jacobian)]
-    for function in (*functions, reach):
+    if reach is not None:
+        functions.append(reach)
+    for function in functions:
         generator.add(function)
     entries = ", ".join(
         f"{{{k.name}_residual, {k.name}_jacobian, {k.inputs}, {k.rows}, {int(k.equality)}}}"
@@ -28,7 +30,8 @@ def _source(robot: Robot) -> str:
         "KERNELS": entries,
         "LARGEST_INPUT": max(kernel.inputs for kernel in table),
         "LARGEST_ROWS": max(kernel.rows for kernel in table),
-        "WORK": max(1, *(function.sz_w() for function in (*functions, reach))),
+        "WORK": max(1, *(function.sz_w() for function in functions)),
+        "CLOSED_FORM": int(reach is not None),
     }
     loop = Path(__file__).with_name("solver.c").read_text(encoding="utf-8")
     defines = "\n".join(f"#define {name} {value}" for name, value in macros.items())

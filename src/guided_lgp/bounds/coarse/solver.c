@@ -266,6 +266,7 @@ int coarse_solve(const program *nlp, const settings *options, double *values, do
     return tried;
 }
 
+#if CLOSED_FORM
 /* Closed-form inverse kinematics of `count` arguments (15 each) to 8 numbers each. */
 void coarse_reach(int count, const double *x, double *out)
 {
@@ -276,3 +277,4 @@ void coarse_reach(int count, const double *x, double *out)
         reach(arguments, results, NULL, work, 0);
     }
 }
+#endif

@@ -64,7 +64,7 @@ class Solver(Protocol):
         ...
 
     def reach(self, arguments: Array) -> Array:
-        """Inverse kinematics: (count, 15) to (count, 8), see
+        """Inverse kinematics of arms that have a closed form: (count, 15) to (count, 8), see
         :func:`guided_lgp.bounds.terms.hold.reach_function`."""
         ...
 
@@ -93,9 +93,7 @@ class Compiled:
         self._solve = library.coarse_solve
         self._solve.restype = ctypes.c_int
         self._solve.argtypes = [ctypes.c_void_p] * 5
-        self._reach = library.coarse_reach
-        self._reach.restype = None
-        self._reach.argtypes = [ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p]
+        self._library = library
 
     def solve(self, program: Program, values: Array, settings: Settings) -> Solution:
         """See :class:`Solver`."""
@@ -120,7 +118,8 @@ class Compiled:
         """See :class:`Solver`."""
         arguments = np.ascontiguousarray(arguments)
         solutions = np.empty((len(arguments), 8))
-        self._reach(len(arguments), arguments.ctypes.data, solutions.ctypes.data)
+        pointers = [ctypes.c_void_p(a.ctypes.data) for a in (arguments, solutions)]
+        self._library.coarse_reach(len(arguments), *pointers)
         return solutions
 
 
@@ -184,8 +183,9 @@ class Interpreter:
 
     def reach(self, arguments: Array) -> Array:
         """See :class:`Solver`."""
-        solutions = reach_function(self._robot).map(len(arguments))(np.asarray(arguments).T)
-        return np.array(solutions).T
+        reach = reach_function(self._robot)
+        assert reach is not None  # only asked where there is one
+        return np.array(reach.map(len(arguments))(np.asarray(arguments).T)).T
 
     def _arguments(self, program: Program, i: int, values: Array) -> tuple[Kernel, Array, Array]:
         kernel = self._table[program.kernel[i]]

@@ -26,6 +26,7 @@ from guided_lgp.bounds.program.slots import (
 )
 from guided_lgp.bounds.results import Array
 from guided_lgp.bounds.terms.term import Term, UngraspableError
+from guided_lgp.robots.inverse import inverse_kinematics
 
 PALM_GAP = 0.002
 """Distance of the box's nearest corner from the palm (m)."""
@@ -256,20 +257,8 @@ def _solutions(
     """
     arm = draft.robot.arms[held.gripper]
     ends = np.array([(0.0, 0.0), *((segment.back, segment.up) for segment in segments)])
-    shape = (len(poses), len(tried), len(ends), 2 * len(_PANS))
-    arguments = np.empty((*shape, REACH_INPUTS))
-    arguments[..., :4] = poses[:, None, None, None]
-    arguments[..., 4] = tried[:, None, None]
-    arguments[..., 5] = float(draft.values[held.offset])
-    arguments[..., 6] = np.tile(_PANS, 2)
-    arguments[..., 7] = np.repeat([1.0, -1.0], len(_PANS))
-    arguments[..., 8] = arm.side
-    arguments[..., 9] = draft.fixed[0]
-    arguments[..., 10] = ends[:, 1, None]
-    arguments[..., 11:14] = held.half_length, held.half_height, held.turn
-    arguments[..., 14] = ends[:, 0, None]
-    solutions = draft.reach(arguments.reshape(-1, REACH_INPUTS)).reshape(*shape, -1)
-    joints, missing = solutions[..., :-1], solutions[..., -1]
+    solve = _general if human_like(arm.chain) is None else _closed_form
+    joints, missing = solve(draft, held, poses, tried, ends)
     low, high = np.array(arm.limits).T
     beyond = np.maximum(low - joints, 0) + np.maximum(joints - high, 0)
     motion = ((joints - arm.home) ** 2)[..., :_SHOULDER_JOINTS].sum(axis=-1)
@@ -277,8 +266,66 @@ def _solutions(
     return np.clip(joints, low, high), costs.sum(axis=2)
 
 
+def _closed_form(
+    draft: Draft, held: HeldBox, poses: Array, tried: Array, ends: Array
+) -> tuple[Array, Array]:
+    """Joints (poses, pitches, ends, candidates, n) of arms like the PR2's, and what is missing."""
+    shape = (len(poses), len(tried), len(ends), 2 * len(_PANS))
+    arguments = np.empty((*shape, REACH_INPUTS))
+    arguments[..., :4] = poses[:, None, None, None]
+    arguments[..., 4] = tried[:, None, None]
+    arguments[..., 5] = float(draft.values[held.offset])
+    arguments[..., 6] = np.tile(_PANS, 2)
+    arguments[..., 7] = np.repeat([1.0, -1.0], len(_PANS))
+    arguments[..., 8] = draft.robot.arms[held.gripper].side
+    arguments[..., 9] = draft.fixed[0]
+    arguments[..., 10] = ends[:, 1, None]
+    arguments[..., 11:14] = held.half_length, held.half_height, held.turn
+    arguments[..., 14] = ends[:, 0, None]
+    solutions = draft.reach(arguments.reshape(-1, REACH_INPUTS)).reshape(*shape, -1)
+    return solutions[..., :-1], solutions[..., -1]
+
+
+def _general(
+    draft: Draft, held: HeldBox, poses: Array, tried: Array, ends: Array
+) -> tuple[Array, Array]:
+    """The same for any arm: a candidate is a value of the redundant joint and a branch."""
+    arm = draft.robot.arms[held.gripper]
+    solver = inverse_kinematics(draft.robot.robot, held.gripper, draft.fixed)
+    rotation, position = _targets(draft, held, poses, tried, ends, arm.chain.palm_front)
+    values = solver.redundancies(_VALUES)
+    q, missing = solver.nearest(rotation[..., None, :, :], position[..., None, :], values)
+    q, missing = (
+        q.reshape(*position.shape[:-1], -1, q.shape[-1]),
+        missing.reshape(*position.shape[:-1], -1),
+    )
+    return q * arm.arm.signs, missing
+
+
+def _targets(
+    draft: Draft, held: HeldBox, poses: Array, tried: Array, ends: Array, palm_front: float
+) -> tuple[Array, Array]:
+    """Rotations (poses, pitches, ends, 3, 3) and origins (…, 3) of the tool."""
+    x = ca.SX.sym("x", 10)
+    position, rotation = tool_target(x[:3], x[3], x[4], x[5], x[6:10], palm_front)
+    targets = ca.Function("targets", [x], [position, ca.reshape(rotation, 9, 1)])
+    arguments = np.empty((len(poses), len(tried), len(ends), 10))
+    arguments[..., :4] = poses[:, None, None]
+    arguments[..., 3] += ends[:, 1]
+    arguments[..., 4] = tried[:, None]
+    arguments[..., 5] = float(draft.values[held.offset])
+    arguments[..., 6:9] = held.half_length, held.half_height, held.turn
+    arguments[..., 9] = ends[:, 0]
+    origins, columns = targets(arguments.reshape(-1, 10).T)
+    shape = arguments.shape[:-1]
+    rotations = np.array(columns).T.reshape(*shape, 3, 3)
+    return np.swapaxes(rotations, -1, -2), np.array(origins).T.reshape(*shape, 3)
+
+
 _PANS = np.linspace(-0.65, 1.6, 10)
 """Values (rad) of the redundant joint that are tried: shoulder pan, left arm."""
+_VALUES = 10
+"""How many values of the redundant joint of other arms are tried."""
 _PITCHES = np.pi * np.array([0.2, 0.35, 0.5, 0.65, 0.8])
 """Pitches (rad) of the approach that are tried, from one end of the box over the top."""
 _PITCH_SPREAD = 0.4
@@ -295,16 +342,17 @@ REACH_INPUTS = 15
 
 
 @cache
-def reach_function(robot: RobotKinematics) -> Any:
-    """CasADi function of one closed-form inverse kinematics.
+def reach_function(robot: RobotKinematics) -> Any | None:
+    """CasADi function of one closed-form inverse kinematics; None if a robot's arms have none.
 
     Inputs (15,): pose (x, y, yaw) and height of the box, pitch, offset, shoulder pan, branch, side,
     torso, lift above the box's place, half length, half height, turn, distance back.
     Outputs (8,): joint values (mirrored for the right arm) and the distance missing to reach (m).
     """
-    (chain,) = robot.chains
+    chain = robot.chains[0]
     lengths = human_like(chain)
-    assert lengths is not None
+    if lengths is None:
+        return None
     x = ca.SX.sym("x", REACH_INPUTS)
     position, rotation = tool_target(x[:3], x[3] + x[10], x[4], x[5], x[11:15], chain.palm_front)
     solution = inverse(lengths, position, rotation, x[6], x[7], x[8], x[9])
