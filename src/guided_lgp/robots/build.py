@@ -41,7 +41,14 @@ def read_robot(file: Path) -> Robot:
         arms[gripper] = _arm(gripper, arm, document, description, joint, finger)
         joint += len(arm.joints)
         finger += len(arm.fingers.joints)
-    return Robot(file.stem, description, document.base_link, document.fixed_joints, arms)
+    return Robot(
+        name=file.stem,
+        description=description,
+        base_link=document.base_link,
+        stand=document.stand,
+        fixed_joints=document.fixed_joints,
+        arms=arms,
+    )
 
 
 def _check(document: RobotDocument, description: Description) -> None:

@@ -165,6 +165,8 @@ class RobotDocument(_Document):
     description: DescriptionFiles
     base_link: str
     """The link that a scene's ``robot.base`` places: the root of the URDF."""
+    stand: tuple[Length, Length] = (0.1, 0.1)
+    """Half extents of the column under the base link, where a scene raises it."""
     fixed_joints: dict[str, FixedJoint] = {}
     acceleration: Length
     """Limits of acceleration over those of velocity (1/s)."""

@@ -157,6 +157,8 @@ class Robot:
     description: Description
     base_link: str
     """The root of the URDF, which a scene places."""
+    stand: tuple[float, float]
+    """Half extents (m) of the column under the base link, where a scene raises it."""
     fixed_joints: Mapping[str, FixedJoint]
     """Joints that keep the value that the scene gives them, by their name in the scene."""
     arms: Mapping[str, Arm]

@@ -2,11 +2,20 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    ValidationError,
+    model_serializer,
+    model_validator,
+)
 
 from guided_lgp.documents import read_json
 from guided_lgp.domains import load_domain
@@ -28,6 +37,16 @@ class _Document(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
+@dataclass(frozen=True)
+class Column:
+    """A body that is neither moved nor stood on: half extents (3,) in m, and pose (7,)."""
+
+    half: tuple[float, float, float]
+    placement: Array
+    name: str = "robot.column"
+    """No box or table can be called so."""
+
+
 class PlacedRobot(BaseModel):
     """A robot whose base stands still.
 
@@ -41,7 +60,9 @@ class PlacedRobot(BaseModel):
     model: str = "pr2"
     """A robot by its name, or the path of a robot file."""
     base: tuple[Coordinate, Coordinate, Coordinate] = (0.0, 0.0, 0.0)
-    """x and y (m) and yaw (rad) of the base link on the floor."""
+    """x and y (m) and yaw (rad) of the base link."""
+    height: Annotated[float, Field(strict=True, ge=0, le=5, allow_inf_nan=False)] = 0.0
+    """Of the base link above the floor (m); above it, the robot stands on a column."""
 
     @property
     def description(self) -> Robot:
@@ -52,7 +73,7 @@ class PlacedRobot(BaseModel):
     def base_pose(self) -> Array:
         """Pose (7,) of the base link in the world."""
         x, y, yaw = self.base
-        return pose((x, y, 0.0), yaw)
+        return pose((x, y, self.height), yaw)
 
     @property
     def fixed_values(self) -> dict[str, float]:
@@ -64,6 +85,14 @@ class PlacedRobot(BaseModel):
     def torso(self) -> float:
         """Height (m) of the PR2's torso."""
         return self.__pydantic_extra__["torso"]
+
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        """What the robot stands on, where that is not the floor: an obstacle."""
+        if not self.height:
+            return ()
+        half = (*self.description.stand, self.height / 2)
+        return (Column(half, pose((*self.base[:2], self.height / 2), self.base[2])),)
 
     def link_pose(self, q: Array, link: str) -> Array:
         """Pose (7,) of a link's frame in the world (forward kinematics by pinocchio).
@@ -103,11 +132,19 @@ class PlacedRobot(BaseModel):
             name: fixed.default
             for name, fixed in load_robot(data.get("model", "pr2")).fixed_joints.items()
         }
-        accepted = ("model", "base", *defaults)
+        accepted = (*cls.model_fields, *defaults)
         for field in data:
             if field not in accepted:
                 raise ValueError(f"unknown field {field!r} ({', '.join(accepted)})")
         return data | {name: data.get(name, value) for name, value in defaults.items()}
+
+    @model_serializer(mode="wrap")
+    def _without_floor(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Version 1 of the document has no height."""
+        document: dict[str, Any] = serialize(self)
+        if not self.height:
+            del document["height"]
+        return document
 
 
 def grasp_axis(size: tuple[float, float, float]) -> int:

@@ -104,10 +104,16 @@ class World:
             )
         self.tables = {table.name: self._add_table(table) for table in scene.tables}
         self.boxes = {box.name: self._add_box(box.name, box.size) for box in scene.boxes}
+        self._columns = {
+            column.name: self._add_body(0.0, column.half, column.placement, _LEGS)
+            for column in scene.robot.columns
+        }
         self._names: dict[tuple[int, int], str] = {
             (self.robot, index): link for link, index in self.links.items()
         }
-        self._names |= {(body, -1): n for n, body in (self.tables | self.boxes).items()}
+        self._names |= {
+            (body, -1): n for n, body in (self.tables | self.boxes | self._columns).items()
+        }
         self._parts = {name: part for part, name in self._names.items()}
         self._filter_pairs()
         self._dressed = False
@@ -323,9 +329,9 @@ class World:
         for one, other in combinations(solid, 2):
             if not {one, other} & moving or frozenset((one, other)) in disabled:
                 self._ignore(self._parts[one], self._parts[other])
-        for table in self.tables.values():
+        for body in (*self.tables.values(), *self._columns.values()):
             for link in self.fixed_links:
-                self._ignore(self._parts[link], (table, -1))
+                self._ignore(self._parts[link], (body, -1))
 
     def _ignore(self, first: tuple[int, int], second: tuple[int, int]) -> None:
         pybullet.setCollisionFilterPair(

@@ -70,7 +70,7 @@ class SceneGeometry:
             float(cosine * x - sine * y + self._shift[0]),
             float(sine * x + cosine * y + self._shift[1]),
             yaw + self._turn,
-            z + raised,
+            z + raised + float(self._shift[2]),
         )
 
     def in_world(self, x: float, y: float, yaw: float, z: float) -> Array:
@@ -78,7 +78,8 @@ class SceneGeometry:
         base_x, base_y, base_yaw = self.scene.robot.base
         cosine, sine = math.cos(base_yaw), math.sin(base_yaw)
         half = (yaw + base_yaw) / 2
-        position = (base_x + cosine * x - sine * y, base_y + sine * x + cosine * y, z)
+        height = z + self.scene.robot.height
+        position = (base_x + cosine * x - sine * y, base_y + sine * x + cosine * y, height)
         return np.array([*position, 0.0, 0.0, math.sin(half), math.cos(half)])
 
     def grasp_side(self, name: str) -> tuple[float, float, float]:
