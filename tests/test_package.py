@@ -6,6 +6,7 @@ import subprocess
 import sys
 import venv
 from collections.abc import Sequence
+from importlib import metadata
 from importlib.metadata import Distribution
 from pathlib import Path
 
@@ -13,9 +14,10 @@ import pytest
 import yaml
 from packaging.requirements import Requirement
 
+from guided_lgp import __version__
 from guided_lgp.params import PlanningParams, load_params, load_planning
 from guided_lgp.paths import MODELS, PLANNING
-from guided_lgp.ship import ship
+from guided_lgp.ship import CARD, ship
 
 ROOT = Path(__file__).parents[1]
 PIPELINE_ONLY = ("torch", "lightning", "mlflow", "dvc", "pandas", "pyarrow", "joblib", "jinja2")
@@ -141,6 +143,7 @@ def test_shipped_limits_are_those_of_the_pipeline() -> None:
 def test_ship_takes_the_weights_and_limits_of_a_clone(tmp_path: Path) -> None:
     clone = tmp_path / "clone"
     shutil.copytree(ROOT / "models", clone / "models")
+    shutil.copytree(ROOT / "reports/metrics", clone / "reports/metrics")
     (clone / "models" / "relational.json").write_text("{}")
     params = yaml.safe_load((ROOT / "params.yaml").read_text())
     params["bounds"]["coarse_tries"] = 5
@@ -150,3 +153,19 @@ def test_ship_takes_the_weights_and_limits_of_a_clone(tmp_path: Path) -> None:
     assert {f.name for f in (tmp_path / "models").iterdir()} == {f.name for f in MODELS.iterdir()}
     assert load_planning(tmp_path / "planning.yaml").bounds.coarse_tries == 5
     assert load_planning(PLANNING).bounds.coarse_tries != 5
+    assert f"{params['generate_scenes']['training_configurations']} random scenes" in (
+        (tmp_path / "models" / CARD).read_text()
+    )
+
+
+def test_the_version_is_said_once() -> None:
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+    assert citation["version"] == __version__ == metadata.version("guided-lgp")
+    assert f"## [{__version__}]" in (ROOT / "CHANGELOG.md").read_text()
+
+
+def test_continuous_integration_runs_what_anyone_can_run() -> None:
+    workflow = yaml.safe_load((ROOT / ".github/workflows/ci.yml").read_text())
+    assert workflow["jobs"]["test"]["steps"][-1]["run"] == ".ci/run"
+    for form in (ROOT / ".github/ISSUE_TEMPLATE").glob("*.yml"):
+        assert {"name", "description", "body"} <= yaml.safe_load(form.read_text()).keys()

@@ -2,14 +2,25 @@
 
 import shutil
 from pathlib import Path
+from typing import Any
 
 import yaml
 
-from guided_lgp.documents import write_text
-from guided_lgp.params import PlanningParams, load_params
-from guided_lgp.paths import MODELS, PARAMS, PLANNING, TRAINED
+from guided_lgp.documents import read_json, write_text
+from guided_lgp.params import Params, PlanningParams, load_params
+from guided_lgp.paths import METRICS, MODELS, PARAMS, PLANNING, TRAINED
 
+CARD = "README.md"
+"""The model card, beside the weights."""
 _HEADING = "# Limits of planning; written by `make ship` from params.yaml.\n"
+_SHARES = (
+    ("paper, default", "default"),
+    ("paper, objective adaptation", "adaptation"),
+    ("improved, objective adaptation", "improved_adaptation"),
+    ("relational, objective adaptation", "relational"),
+    ("no policy, best-first (control)", "uniform_best_first"),
+)
+"""Rows of the model card: what was evaluated, and its name in the metrics."""
 
 
 def ship(root: Path, models: Path = MODELS, limits: Path = PLANNING) -> None:
@@ -17,15 +28,77 @@ def ship(root: Path, models: Path = MODELS, limits: Path = PLANNING) -> None:
 
     Args:
         root: the folder of ``dvc.yaml``.
-        models: the folder to fill.
+        models: the folder to fill, with a model card.
         limits: the file to write.
 
     Raises:
-        InputError: the parameters are missing or damaged, or a file cannot be written.
+        InputError: the parameters or metrics are missing or damaged, or a file cannot be written.
     """
+    params = load_params(root / PARAMS)
+    metrics = read_json(root / METRICS / "generalization.json", "the output of the pipeline")
     shutil.copytree(root / TRAINED, models, dirs_exist_ok=True)
-    params = load_params(root / PARAMS).model_dump(include=set(PlanningParams.model_fields))
-    write_text(limits, _HEADING + yaml.safe_dump(params, sort_keys=True))
+    write_text(models / CARD, model_card(params, metrics))
+    planning = params.model_dump(include=set(PlanningParams.model_fields))
+    write_text(limits, _HEADING + yaml.safe_dump(planning, sort_keys=True))
+
+
+def model_card(params: Params, metrics: dict[str, Any]) -> str:
+    """What the weights are for, what they were trained on, and how well they do, in Markdown.
+
+    Args:
+        params: of the pipeline that trained them.
+        metrics: shares of solutions by planner and set of objectives.
+    """
+    scenes, objectives = params.generate_scenes, params.build_dataset
+    rows = [
+        f"| {text} | {_share(metrics[name], 'all')} | {_share(metrics[name], 'unseen')} |"
+        for text, name in _SHARES
+        if name in metrics
+    ]
+    return _CARD.format(
+        training=scenes.training_configurations,
+        test=scenes.test_configurations,
+        objectives=objectives.training_objectives,
+        seeds=f"{scenes.seed_training}, {objectives.seed}, {params.train_policy.seed}",
+        rows="\n".join(rows),
+    )
+
+
+def _share(subsets: dict[str, Any], subset: str) -> str:
+    return f"{100 * subsets[subset]['shortest']:.1f} %"
+
+
+_CARD = """\
+# Model card
+
+Written by `make ship`. Small feed-forward and message-passing networks (safetensors, float32) that
+score the next action of a pick-and-place task; guided-lgp reads them with NumPy. They propose;
+whether an action is possible is decided by a nonlinear program and verified in simulation.
+
+| policy | networks | takes |
+|---|---|---|
+| paper | `instruction`, `grasp`, `place` (the paper's Table IV) | 3 boxes and 2 tables |
+| improved | the same, in `improved/`, trained on more and better ordered samples | the same |
+| relational | `relational` | any number of boxes and tables |
+
+**Input.** One or two goals `(on BOX TABLE)`, `(held BOX)`; what stands where; positions of
+grippers, boxes and tables (m). **Output.** A log-probability per applicable action. Sizes of boxes
+are not an input.
+
+**Training.** Shortest feasible sequences of actions in {training} random scenes of three boxes on
+two tables before a PR2, for {objectives} objectives of two goals. No data from people or robots.
+Seeds (scenes, objectives, training): {seeds}.
+
+**Evaluation.** {test} other scenes, all 87 objectives of one or two goals; share of problems solved
+with the smallest number of actions:
+
+| policy, search | all objectives | unseen ones |
+|---|---:|---:|
+{rows}
+
+**Limits.** Trained with one robot, one size of box and tables of one height. Where geometry decides
+the order of actions, the policy cannot see it. MIT licence, as the program.
+"""
 
 
 if __name__ == "__main__":
