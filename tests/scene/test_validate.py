@@ -108,5 +108,12 @@ def test_a_number_that_is_none_or_too_small_is_refused(changes: dict[str, Any], 
         scene(**changes)
 
 
+def test_the_domain_is_written_unless_it_is_that_of_the_paper() -> None:
+    assert "domain" not in scene().model_dump(mode="json")
+    assert scene(domain="pick_and_place") == scene()
+    with pytest.raises(InputError, match=r"unknown domain 'chess' \(.*pick_and_place"):
+        scene(domain="chess")
+
+
 def test_integers_are_coordinates() -> None:
     assert scene(robot__base=[0, 0, 0]).robot.base == (0.0, 0.0, 0.0)

@@ -5,7 +5,6 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from guided_lgp.domains import load_domain
 from guided_lgp.logic import State, Symbols
 from guided_lgp.scene import GRIPPERS
 
@@ -13,7 +12,7 @@ from guided_lgp.scene import GRIPPERS
 def declared_symbols(state: State, positions: Mapping[str, NDArray[np.float64]]) -> Symbols:
     """The symbols of a state, in the order in which a search hands over their positions."""
     boxes = {name for name, _ in state.support + state.held}
-    return load_domain().symbols(
+    return state.domain.symbols(
         gripper=GRIPPERS,
         box=tuple(name for name in positions if name in boxes),
         table=tuple(name for name in positions if name not in {*GRIPPERS, *boxes}),

@@ -13,12 +13,13 @@ from pydantic import (
     Field,
     SerializerFunctionWrapHandler,
     ValidationError,
+    field_validator,
     model_serializer,
     model_validator,
 )
 
 from guided_lgp.documents import read_json
-from guided_lgp.domains import load_domain
+from guided_lgp.domains import PAPER, domain_names, load_domain
 from guided_lgp.errors import InputError
 from guided_lgp.logic import State, Symbols
 from guided_lgp.poses import Array, compose, pose
@@ -172,9 +173,10 @@ class Box(_Document):
 
 
 class Scene(_Document):
-    """An initial configuration x_0 with its symbols."""
+    """An initial configuration x_0 with its symbols, and the domain whose actions may be used."""
 
     name: str = "scene"
+    domain: str = Field(default=PAPER, exclude_if=lambda name: name == PAPER)
     robot: PlacedRobot = Field(default_factory=PlacedRobot)
     tables: Annotated[tuple[Table, ...], Field(min_length=1)]
     boxes: Annotated[tuple[Box, ...], Field(min_length=1)]
@@ -182,7 +184,7 @@ class Scene(_Document):
     @property
     def symbols(self) -> Symbols:
         """The symbols of the scene by logic type, as declared."""
-        return load_domain().symbols(
+        return load_domain(self.domain).symbols(
             gripper=self.robot.description.grippers,
             box=(box.name for box in self.boxes),
             table=(table.name for table in self.tables),
@@ -191,7 +193,14 @@ class Scene(_Document):
     @property
     def state(self) -> State:
         """The initial symbolic state."""
-        return load_domain().state({box.name: box.on for box in self.boxes})
+        return load_domain(self.domain).state({box.name: box.on for box in self.boxes})
+
+    @field_validator("domain")
+    @classmethod
+    def _known(cls, domain: str) -> str:
+        if domain not in domain_names():
+            raise ValueError(f"unknown domain {domain!r} ({', '.join(domain_names())})")
+        return domain
 
     @model_validator(mode="after")
     def _names(self) -> "Scene":
