@@ -3,12 +3,13 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
-from guided_lgp.logic import Action, Objective, State
+    from guided_lgp.logic import Action, Objective, State
 
 
 class TrainedPolicy(Protocol):
@@ -16,11 +17,11 @@ class TrainedPolicy(Protocol):
 
     def log_probabilities(
         self,
-        objective: Objective,
-        state: State,
-        positions: Mapping[str, NDArray[np.float64]],
-        actions: Sequence[Action],
-    ) -> NDArray[np.float64]:
+        objective: "Objective",
+        state: "State",
+        positions: "Mapping[str, NDArray[np.float64]]",
+        actions: "Sequence[Action]",
+    ) -> "NDArray[np.float64]":
         """(len(actions),) natural logarithms of the probabilities of applicable actions."""
         ...
 

@@ -1,0 +1,34 @@
+"""``doctor``: whether the installation is whole."""
+
+import json
+from dataclasses import asdict
+
+import typer
+
+from guided_lgp.cli.terminal import AsJson, show
+
+app = typer.Typer()
+
+
+@app.command()
+def doctor(as_json: AsJson = False) -> None:
+    """Check the installation and say how to mend what is missing.
+
+    Example: guided-lgp doctor
+    """
+    from guided_lgp.doctor import examine
+
+    findings = examine()
+    if as_json:
+        typer.echo(json.dumps([asdict(finding) for finding in findings], indent=1))
+    else:
+        marks = {True: "ok", False: "FAIL"}
+        show(
+            ["", "check", "found", "how to mend it"],
+            [
+                (marks[finding.ok], finding.name, finding.detail, finding.mend)
+                for finding in findings
+            ],
+        )
+    if not all(finding.ok for finding in findings):
+        raise typer.Exit(1)

@@ -1,0 +1,127 @@
+"""``examples``, ``export``, ``schema`` and ``view``: scenes and plans as files and pictures."""
+
+import json
+import shutil
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from guided_lgp.documents import read_json
+from guided_lgp.errors import InputError
+from guided_lgp.paths import EXAMPLES
+
+app = typer.Typer()
+
+
+@app.command()
+def examples(
+    folder: Annotated[
+        Path, typer.Argument(metavar="FOLDER", help="Where to put them; it is made if need be.")
+    ] = Path("examples"),
+) -> None:
+    """Copy the example scenes that come with the package.
+
+    Example: guided-lgp examples
+    """
+    if folder.exists() and any(folder.iterdir()):
+        raise InputError(str(folder), "is not empty", "a new folder")
+    shutil.copytree(EXAMPLES, folder, dirs_exist_ok=True)
+    for scene in sorted(folder.glob("*.json")):
+        typer.echo(scene)
+
+
+@app.command()
+def export(
+    plan_file: Annotated[
+        Path, typer.Argument(metavar="PLAN", help="A plan written by plan --out.")
+    ],
+    out: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE",
+            help="FILE.json: JointTrajectory messages, one per action; FILE.csv: a row per point; "
+            "no suffix: a folder with a ROS 2 bag.",
+        ),
+    ],
+    speed: Annotated[
+        float, typer.Option(metavar="SHARE", help="Share of the robot's speed, in (0, 1].")
+    ] = 1.0,
+) -> None:
+    """Write a plan's motion for a robot's trajectory controllers.
+
+    Example: guided-lgp export plan.json motion.csv --speed 0.5
+    """
+    from guided_lgp.bounds.plan_file import read_plan
+    from guided_lgp.export import export_plan
+
+    export_plan(read_plan(plan_file), out, speed)
+    typer.echo(f"written: {out}")
+
+
+class Format(StrEnum):
+    """Files that have a JSON Schema."""
+
+    SCENE = "scene"
+    PLAN = "plan"
+    PLANNING = "planning"
+    PARAMS = "params"
+
+
+@app.command()
+def schema(
+    name: Annotated[Format, typer.Argument(help="Which file.")],
+) -> None:
+    """Print the JSON Schema of a file, for editors and validators.
+
+    Example: guided-lgp schema scene > scene.schema.json
+    """
+    from guided_lgp.schemas import schema as schema_of
+
+    typer.echo(json.dumps(schema_of(name.value), indent=1))
+
+
+@app.command()
+def view(
+    file: Annotated[
+        Path,
+        typer.Argument(metavar="FILE", help="A scene, or a plan written by plan --out, as JSON."),
+    ],
+    port: Annotated[
+        int,
+        typer.Option(
+            metavar="N", help="TCP port on this machine alone (127.0.0.1).", min=1, max=65535
+        ),
+    ] = 8080,
+) -> None:
+    """Show a scene, or a plan in motion, in the browser until Ctrl-C.
+
+    Example: guided-lgp view examples/three_boxes.json
+
+    Example: guided-lgp view plan.json --port 8081
+    """
+    from guided_lgp.bounds.plan_file import read_plan
+    from guided_lgp.scene import load_scene
+    from guided_lgp.scene.validate import validate_scene
+    from guided_lgp.view.live import view as serve
+
+    found = read_plan(file) if _is_plan(file) else None
+    scene = found.scene if found else load_scene(file)
+    validate_scene(scene, str(file))
+    serve(
+        scene,
+        found.trajectory if found else None,
+        port,
+        announce=lambda address: typer.echo(f"{address} (Ctrl-C ends it)"),
+    )
+
+
+def _is_plan(file: Path) -> bool:
+    """Whether a file is a plan; what is not is left to the reader of scenes.
+
+    Raises:
+        InputError: the file is missing or is not JSON.
+    """
+    document = read_json(file, "a scene, or a plan written by plan --out")
+    return isinstance(document, dict) and "actions" in document

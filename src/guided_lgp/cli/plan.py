@@ -1,0 +1,199 @@
+"""``plan``: one task."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from guided_lgp import __version__
+from guided_lgp.cli.terminal import AsJson, one_of, show, spinner
+from guided_lgp.errors import InputError
+from guided_lgp.paths import MODELS, PLANNING
+from guided_lgp.policy.registry import POLICIES
+from guided_lgp.search.planners import SEARCHES
+
+app = typer.Typer()
+
+_HINTS: Mapping[str | None, str] = {
+    "attempts": "--planner best-first goes on after the last attempt",
+    "stopped": "--max-nodes raises the limit",
+}
+"""What a user can do about the reason for which a search ended."""
+
+
+@app.command()
+def plan(
+    scene: Annotated[
+        Path, typer.Argument(metavar="SCENE", help="JSON file with tables and boxes.")
+    ],
+    goal: Annotated[
+        list[str],
+        typer.Option(
+            metavar="GOAL",
+            help='What must hold at the end: "(on BOX TABLE)", where TABLE may be another box, or '
+            '"(held BOX)". Once for each goal.',
+        ),
+    ],
+    planner: Annotated[
+        str,
+        typer.Option(
+            parser=one_of(SEARCHES),
+            metavar=f"[{'|'.join(SEARCHES)}]",
+            help="How to search. "
+            + "; ".join(f"{name}: {search.summary}" for name, search in SEARCHES.items())
+            + ".",
+        ),
+    ] = "guided",
+    policy: Annotated[
+        str,
+        typer.Option(
+            parser=one_of(POLICIES),
+            metavar=f"[{'|'.join(POLICIES)}]",
+            help="Which trained policy. "
+            + "; ".join(f"{name}: {declared.summary}" for name, declared in POLICIES.items())
+            + ".",
+        ),
+    ] = "relational",
+    max_nodes: Annotated[
+        int,
+        typer.Option(min=1, metavar="N", help="Give up when the search tree has N nodes."),
+    ] = 5000,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Write the plan as JSON, with its joint motion in rad and s.",
+            show_default="no file",
+        ),
+    ] = None,
+    html: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Write a page that plays the motion in the browser.",
+            show_default="no file",
+        ),
+    ] = None,
+    execute: Annotated[
+        bool,
+        typer.Option(
+            "--execute",
+            help="Carry the plan out in a simulation under gravity.",
+            show_default="plan only",
+        ),
+    ] = False,
+    models: Annotated[
+        Path,
+        typer.Option(
+            metavar="FOLDER",
+            help="Folder with the trained policies.",
+            show_default="those shipped with the package",
+        ),
+    ] = MODELS,
+    params: Annotated[
+        Path,
+        typer.Option(
+            metavar="FILE",
+            help="YAML file with the limits of the solver and of the search: the sections bounds "
+            "and compare_scalability.",
+            show_default="those shipped with the package",
+        ),
+    ] = PLANNING,
+    as_json: AsJson = False,
+) -> None:
+    """Plan a sequence of actions and the motion for it.
+
+    Ends with 0 if a plan was found, with 1 and the reason if not, with 2 for bad input.
+
+    Example: guided-lgp plan examples/three_boxes.json --goal "(on red green)" --goal "(held blue)"
+
+    Example: guided-lgp plan scene.json --goal "(on red tray)" --html plan.html --execute
+    """
+    from guided_lgp.logic import parse_objective
+    from guided_lgp.params import load_planning
+    from guided_lgp.planning import plan as search
+    from guided_lgp.scene import load_scene
+
+    for file in filter(None, (out, html)):
+        if not file.parent.is_dir():
+            raise InputError(str(file), "its folder does not exist", "a file in an existing folder")
+    start = load_scene(scene)
+    objective = parse_objective(goal)
+    with spinner("planning"):
+        result = search(
+            start,
+            objective,
+            planner,
+            policy=policy,
+            models=models,
+            params=load_planning(params),
+            max_nodes=max_nodes,
+            where=str(scene),
+        )
+    followed = SEARCHES[planner].follows_policy
+    times = {name: round(value, 3) for name, value in asdict(result.times).items()}
+    statistics = {
+        "planner": planner,
+        "policy": policy if followed else None,
+        "weights": _origin(models, MODELS) if followed else None,
+        "limits": _origin(params, PLANNING),
+        "tree_size": result.tree_size,
+        "attempts": 1 + sum(result.reattempts.values()),
+        "coarse_sequences": result.coarse_calls,
+        "solver_starts": result.solver_starts,
+        "path_sequences": result.path_calls,
+        "time_s": times,
+    }
+    summary = {
+        "solved": result.solved,
+        "actions": [str(action) for action in result.skeleton or ()],
+        "explanation": result.explanation,
+        "obstacles": [obstacle.document() for obstacle in result.obstacles],
+        "statistics": statistics,
+    }
+    path = result.path
+    if path is None or path.trajectory is None:
+        if as_json:
+            typer.echo(json.dumps(summary, indent=1))
+        typer.echo(f"no plan: {result.explanation}", err=True)
+        for obstacle in result.obstacles[1:3]:
+            typer.echo(f"also infeasible: {obstacle}", err=True)
+        if hint := _HINTS.get(result.reason):
+            typer.echo(f"hint: {hint}", err=True)
+        raise typer.Exit(1)
+    physics = None
+    if execute:
+        from guided_lgp.bounds.execution import execute as simulate
+
+        with spinner("executing"):
+            physics = asdict(simulate(start, objective, path.skeleton, path.trajectory))
+        summary["physics"] = physics
+    if out:
+        from guided_lgp.bounds.plan_file import write_plan
+
+        write_plan(out, start, objective, path, statistics, physics)
+    if html:
+        from guided_lgp.view.replay import replay_html
+
+        with spinner("writing the replay"):
+            replay_html(path.trajectory, start, html)
+    if as_json:
+        typer.echo(json.dumps(summary, indent=1))
+        return
+    show(["", "action"], [(str(k), str(a)) for k, a in enumerate(path.skeleton, 1)])
+    typer.echo(f"motion of {path.trajectory.times[-1]:.1f} s, found in {sum(times.values()):.1f} s")
+    guide = f"policy {policy}, weights {statistics['weights']}; " if statistics["policy"] else ""
+    typer.echo(f"with: {guide}limits {statistics['limits']}")
+    if physics is not None:
+        fault = physics["fault"] or f"goals: {physics['goals']}"
+        typer.echo(f"physics: {'all goals hold' if physics['success'] else fault}")
+    for file in filter(None, (out, html)):
+        typer.echo(f"written: {file}")
+
+
+def _origin(path: Path, shipped: Path) -> str:
+    """Where weights or limits come from, for the user: the package, unless another was named."""
+    return f"shipped with {__version__}" if path == shipped else str(path)

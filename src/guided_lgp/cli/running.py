@@ -1,0 +1,66 @@
+"""Running a program: errors become one line and an exit code."""
+
+import logging
+import sys
+from collections.abc import Callable, Sequence
+from typing import NoReturn
+
+import typer
+from typer.exceptions import TyperException
+
+from guided_lgp.errors import InputError, WorkerError
+
+
+def run_program(program: Callable[[list[str]], int | None], arguments: Sequence[str]) -> NoReturn:
+    """Run a program; every error becomes one line on standard error and an exit code.
+
+    Args:
+        program: is given the words of the command line; what it returns is the exit code.
+        arguments: these words, and anywhere among them ``--debug`` for the traceback of an error.
+    """
+    debug = "--debug" in arguments
+    logging.basicConfig(format="%(message)s", level=logging.WARNING)
+    logging.getLogger("guided_lgp").setLevel(logging.DEBUG if debug else logging.INFO)
+    try:
+        code = program([word for word in arguments if word != "--debug"])
+    except (InputError, TyperException) as error:
+        _fail(error, 2, debug)
+    except ModuleNotFoundError as error:
+        _fail(_missing(error), 2, debug)
+    except KeyboardInterrupt:
+        sys.exit(130)
+    except Exception as error:
+        _fail(error, 3, debug)
+    sys.exit(code)
+
+
+_EXTRAS = {
+    "PIL": "view",
+    "dask": "cluster",
+    "distributed": "cluster",
+    "gymnasium": "gym",
+    "rosbags": "ros",
+    "viser": "view",
+}
+"""The extra that brings a package, where it is not ``pipeline``."""
+
+
+def _missing(error: ModuleNotFoundError) -> Exception:
+    """What to install for a package that the core goes without; a module of our own is a fault."""
+    package = (error.name or "").partition(".")[0]
+    if package in ("", "guided_lgp"):
+        return error
+    extra = _EXTRAS.get(package, "pipeline")
+    return InputError(
+        f"package {package}", "is not installed", f"pip install 'guided-lgp[{extra}]'"
+    )
+
+
+def _fail(error: Exception, code: int, debug: bool) -> NoReturn:
+    if debug:
+        raise error
+    text = error.format_message() if isinstance(error, TyperException) else str(error)
+    if code == 3 and not isinstance(error, WorkerError):
+        text = f"internal error: {type(error).__name__}: {text}; --debug shows where"
+    typer.echo(f"error: {' '.join(text.split())}", err=True)
+    sys.exit(code)

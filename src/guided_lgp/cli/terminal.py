@@ -1,0 +1,56 @@
+"""What the commands share: options, and what they show on a terminal."""
+
+import sys
+from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+AsJson = Annotated[
+    bool,
+    typer.Option("--json", help="Write JSON to standard output.", show_default="text"),
+]
+ParamsFile = Annotated[
+    Path, typer.Option(metavar="FILE", help="YAML file with the parameters of all stages.")
+]
+
+
+def one_of(names: Collection[str]) -> Callable[[str], str]:
+    """A parser of an option that accepts some names only."""
+
+    def parse(word: str) -> str:
+        if word not in names:
+            raise typer.BadParameter(f"{word!r} is not one of {', '.join(names)}")
+        return word
+
+    return parse
+
+
+def show(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Print rows: a table on a terminal, lines with tabs in a pipe."""
+    if not sys.stdout.isatty():
+        for row in rows:
+            typer.echo("\t".join(filter(None, row)))
+        return
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(*columns)
+    for row in rows:
+        table.add_row(*map(Text, row))
+    Console().print(table)
+
+
+@contextmanager
+def spinner(text: str) -> Iterator[None]:
+    """Show on a terminal that something is going on."""
+    if not sys.stderr.isatty():
+        yield
+        return
+    from rich.console import Console
+
+    with Console(stderr=True).status(text):
+        yield
