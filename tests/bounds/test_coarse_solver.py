@@ -14,6 +14,7 @@ from guided_lgp.bounds.coarse.formulation import Formulator
 from guided_lgp.bounds.coarse.solver import Compiled, Interpreter, Settings
 from guided_lgp.bounds.coarse.starts import Starts
 from guided_lgp.bounds.program.geometry import Margins, SceneGeometry
+from guided_lgp.bounds.program.inverse import INPUTS
 from guided_lgp.bounds.program.kernels import Kernel
 from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.bounds.terms import kernel_table
@@ -26,7 +27,7 @@ from guided_lgp.scene import generate, pr2
 def _compiled() -> Compiled:
     library = compiler.load_library(load_robot("pr2"))
     assert library is not None
-    return Compiled(library)
+    return Compiled(library, load_robot("pr2"))
 
 
 @pytest.mark.parametrize(
@@ -65,8 +66,8 @@ def test_compiled_and_interpreted_loops_agree(skeleton: str) -> None:
     assert one.steps == other.steps
     assert one.violation == pytest.approx(other.violation, abs=1e-7)
     assert one.values == pytest.approx(other.values, abs=1e-6)
-    arguments = rng.uniform(-0.5, 0.5, (20, 15))
-    assert fast.reach(arguments) == pytest.approx(slow.reach(arguments), abs=1e-9)
+    arguments = rng.uniform(-0.5, 0.5, (20, INPUTS))
+    assert fast.reach("0", arguments) == pytest.approx(slow.reach("0", arguments), abs=1e-9)
 
 
 def test_variables_stay_within_their_bounds() -> None:

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import casadi as ca
 
+from guided_lgp.bounds.program.inverse import INPUTS, closed_forms
 from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.bounds.terms import kernel_table
-from guided_lgp.bounds.terms.hold import reach_function
 from guided_lgp.compiled import load_compiled
 from guided_lgp.robots import Robot
 
@@ -15,12 +15,10 @@ from guided_lgp.robots import Robot
 def _source(robot: Robot) -> str:
     """The C code of a robot's kernels, their table, and the loop."""
     kinematics = kinematics_of(robot)
-    table, reach = kernel_table(kinematics), reach_function(kinematics)
+    table, forms = kernel_table(kinematics), closed_forms(kinematics)
     generator = ca.CodeGenerator("kernels", {"casadi_int": "int", "with_header": False})
     functions = [f for kernel in table for f in (kernel.residual, kernel.jacobian)]
-    if reach is not None:
-        functions.append(reach)
-    for function in functions:
+    for function in (*functions, *forms.values()):
         generator.add(function)
     entries = ", ".join(
         f"{{{k.name}_residual, {k.name}_jacobian, {k.inputs}, {k.rows}, {int(k.equality)}}}"
@@ -28,10 +26,11 @@ def _source(robot: Robot) -> str:
     )
     macros = {
         "KERNELS": entries,
+        "REACHES": ", ".join(form.name() for form in forms.values()) or "0",
+        "REACH_INPUTS": INPUTS,
         "LARGEST_INPUT": max(kernel.inputs for kernel in table),
         "LARGEST_ROWS": max(kernel.rows for kernel in table),
-        "WORK": max(1, *(function.sz_w() for function in functions)),
-        "CLOSED_FORM": int(reach is not None),
+        "WORK": max(1, *(function.sz_w() for function in (*functions, *forms.values()))),
     }
     loop = Path(__file__).with_name("solver.c").read_text(encoding="utf-8")
     defines = "\n".join(f"#define {name} {value}" for name, value in macros.items())

@@ -8,12 +8,12 @@ from guided_lgp.bounds.coarse.formulation import Formulation
 from guided_lgp.bounds.coarse.solver import Solution
 from guided_lgp.bounds.program.draft import pose_values
 from guided_lgp.bounds.program.geometry import SceneGeometry
+from guided_lgp.bounds.program.grasp import in_tool
 from guided_lgp.bounds.program.kernels import SCALE, KernelTable
 from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.bounds.program.slots import HeldBox, KeyframeSlots, PlanarPose
 from guided_lgp.bounds.results import Array, Failure, Keyframe
 from guided_lgp.bounds.terms import kernel_table
-from guided_lgp.bounds.terms.hold import in_tool
 from guided_lgp.poses import compose
 
 
@@ -24,7 +24,6 @@ class Decoder:
         placed = geometry.scene.robot
         self._geometry = geometry
         self._robot = placed.description
-        self._arms = kinematics_of(self._robot).arms
         self._table = kernel_table(kinematics_of(self._robot))
         self._tools = {
             gripper: placed.tool_pose(self._robot.home, gripper) for gripper in self._robot.grippers
@@ -57,8 +56,8 @@ class Decoder:
         self, formulation: Formulation, where: PlanarPose | HeldBox, values: Array
     ) -> Array:
         if isinstance(where, HeldBox):
-            chain = self._arms[where.gripper].chain
-            return compose(self._tools[where.gripper], in_tool(where, values, chain))
+            palm_front = self._robot.arms[where.gripper].palm_front
+            return compose(self._tools[where.gripper], in_tool(where, values, palm_front))
         pose = pose_values(values, formulation.program.variables, where)
         return self._geometry.in_world(*pose)
 

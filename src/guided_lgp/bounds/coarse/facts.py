@@ -14,9 +14,10 @@ from guided_lgp.bounds.coarse.formulation import straight_lines
 from guided_lgp.bounds.coarse.reach import Grasp, Limb
 from guided_lgp.bounds.program.context import Line
 from guided_lgp.bounds.program.geometry import SceneGeometry
+from guided_lgp.bounds.program.grasp import PALM_GAP
 from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.bounds.results import Array
-from guided_lgp.bounds.terms.hold import PAD_MARGIN, PALM_GAP
+from guided_lgp.bounds.terms.hold import PAD_MARGIN
 from guided_lgp.bounds.terms.pads import PAD_CENTRE
 from guided_lgp.logic import Skeleton, successor
 from guided_lgp.logic.domain import GroundInstruction

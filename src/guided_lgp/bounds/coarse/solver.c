@@ -1,7 +1,7 @@
 /* Augmented Lagrangian with Levenberg-Marquardt Gauss-Newton steps for a nonlinear program that is
  * a list of kernel instances. The translation unit starts with the generated kernels and defines
- * KERNELS (the table), LARGEST_INPUT, LARGEST_ROWS and WORK. `Interpreter` in solver.py is the same
- * algorithm on CasADi's virtual machine; keep the two alike.
+ * KERNELS (the table), REACHES (closed forms), REACH_INPUTS, LARGEST_INPUT, LARGEST_ROWS and WORK.
+ * `Interpreter` in solver.py is the same algorithm on CasADi's virtual machine; keep the two alike.
  */
 #include <math.h>
 #include <stdlib.h>
@@ -15,6 +15,7 @@ typedef struct {
 } kernel_type;
 
 static const kernel_type kernel_table[] = {KERNELS};
+static const function reach_table[] = {REACHES}; /* closed forms */
 
 typedef struct {
     int variables, instances, rows;
@@ -266,15 +267,13 @@ int coarse_solve(const program *nlp, const settings *options, double *values, do
     return tried;
 }
 
-#if CLOSED_FORM
-/* Closed-form inverse kinematics of `count` arguments (15 each) to 8 numbers each. */
-void coarse_reach(int count, const double *x, double *out)
+/* Closed-form inverse kinematics of `count` arguments (REACH_INPUTS each) to as many results. */
+void coarse_reach(int form, int outputs, int count, const double *x, double *out)
 {
     double work[WORK];
     for (int i = 0; i < count; i++) {
-        const double *arguments[] = {x + 15 * i};
-        double *results[] = {out + 8 * i};
-        reach(arguments, results, NULL, work, 0);
+        const double *arguments[] = {x + REACH_INPUTS * i};
+        double *results[] = {out + outputs * i};
+        reach_table[form](arguments, results, NULL, work, 0);
     }
 }
-#endif

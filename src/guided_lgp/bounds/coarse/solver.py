@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from guided_lgp.bounds.coarse.compiler import load_library
 from guided_lgp.bounds.program.arrays import Program
+from guided_lgp.bounds.program.inverse import closed_forms
 from guided_lgp.bounds.program.kernels import Kernel, KernelTable
 from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.bounds.results import Array
 from guided_lgp.bounds.terms import kernel_table
-from guided_lgp.bounds.terms.hold import reach_function
 from guided_lgp.robots import Robot
 
 _log = logging.getLogger(__name__)
@@ -63,9 +63,12 @@ class Solver(Protocol):
         """Solve from a start: values of the variables, then the constants."""
         ...
 
-    def reach(self, arguments: Array) -> Array:
-        """Inverse kinematics of arms that have a closed form: (count, 15) to (count, 8), see
-        :func:`guided_lgp.bounds.terms.hold.reach_function`."""
+    def reach(self, chain: str, arguments: Array) -> Array:
+        """Closed-form inverse kinematics of a chain.
+
+        Arguments (count, 15) to joints and what is missing (count, n + 1), see
+        :func:`guided_lgp.bounds.program.inverse.closed_form`.
+        """
         ...
 
 
@@ -87,13 +90,17 @@ class _CSettings(ctypes.Structure):
 
 
 class Compiled:
-    """The loop in C with the kernels as machine code."""
+    """The loop in C with a robot's kernels as machine code."""
 
-    def __init__(self, library: ctypes.CDLL) -> None:
+    def __init__(self, library: ctypes.CDLL, robot: Robot) -> None:
         self._solve = library.coarse_solve
         self._solve.restype = ctypes.c_int
         self._solve.argtypes = [ctypes.c_void_p] * 5
-        self._library = library
+        self._reach = library.coarse_reach
+        self._reach.restype = None
+        self._reach.argtypes = [ctypes.c_int] * 3 + [ctypes.c_void_p] * 2
+        forms = closed_forms(kinematics_of(robot))
+        self._forms = {name: (i, form.numel_out()) for i, (name, form) in enumerate(forms.items())}
 
     def solve(self, program: Program, values: Array, settings: Settings) -> Solution:
         """See :class:`Solver`."""
@@ -114,12 +121,12 @@ class Compiled:
         )
         return Solution(values, residuals, worst.value, steps)
 
-    def reach(self, arguments: Array) -> Array:
+    def reach(self, chain: str, arguments: Array) -> Array:
         """See :class:`Solver`."""
+        number, outputs = self._forms[chain]
         arguments = np.ascontiguousarray(arguments)
-        solutions = np.empty((len(arguments), 8))
-        pointers = [ctypes.c_void_p(a.ctypes.data) for a in (arguments, solutions)]
-        self._library.coarse_reach(len(arguments), *pointers)
+        solutions = np.empty((len(arguments), outputs))
+        self._reach(number, outputs, len(arguments), arguments.ctypes.data, solutions.ctypes.data)
         return solutions
 
 
@@ -181,11 +188,10 @@ class Interpreter:
             penalty = min(penalty * settings.growth, settings.largest_penalty)
         return Solution(values, c, worst, tried)
 
-    def reach(self, arguments: Array) -> Array:
+    def reach(self, chain: str, arguments: Array) -> Array:
         """See :class:`Solver`."""
-        reach = reach_function(self._robot)
-        assert reach is not None  # only asked where there is one
-        return np.array(reach.map(len(arguments))(np.asarray(arguments).T)).T
+        form = closed_forms(self._robot)[chain]
+        return np.array(form.map(len(arguments))(np.asarray(arguments).T)).T
 
     def _arguments(self, program: Program, i: int, values: Array) -> tuple[Kernel, Array, Array]:
         kernel = self._table[program.kernel[i]]
@@ -259,7 +265,7 @@ def default_solver(robot: Robot) -> Solver:
     """The compiled solver, or the interpreted one where there is no C compiler (said once)."""
     library = load_library(robot)
     if library is not None:
-        return Compiled(library)
+        return Compiled(library, robot)
     _log.warning(
         "no C compiler found (cc, gcc, clang or the package ziglang): the coarse bound runs "
         "on CasADi's virtual machine, with the same verdicts, about a hundred times slower"

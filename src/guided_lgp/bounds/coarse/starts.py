@@ -11,6 +11,7 @@ from guided_lgp.bounds.coarse.formulation import Formulation
 from guided_lgp.bounds.coarse.solver import Solver
 from guided_lgp.bounds.program.draft import Draft
 from guided_lgp.bounds.program.geometry import SceneGeometry
+from guided_lgp.bounds.program.inverse import reaches
 from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.bounds.results import Array
 from guided_lgp.bounds.terms import hold
@@ -20,9 +21,9 @@ class Starts:
     """Draws starts for one formulation."""
 
     def __init__(self, geometry: SceneGeometry, solver: Solver) -> None:
-        self._robot = kinematics_of(geometry.scene.robot.description)
-        self._fixed = tuple(geometry.scene.robot.fixed_values.values())
-        self._solver = solver
+        placed = geometry.scene.robot
+        self._robot = kinematics_of(placed.description)
+        self._reach = reaches(self._robot, tuple(placed.fixed_values.values()), solver.reach)
 
     def draw(
         self,
@@ -55,8 +56,7 @@ class Starts:
             generator,
             noise,
             self._robot,
-            self._fixed,
-            self._solver.reach,
+            self._reach,
         )
         for choice in formulation.choices:
             choice.start(draft)

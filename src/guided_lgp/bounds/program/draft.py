@@ -1,15 +1,13 @@
 """A start in the making: values that are kept from before, and values that terms choose."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
+from guided_lgp.bounds.program.inverse import Reach
 from guided_lgp.bounds.program.kinematics import RobotKinematics
 from guided_lgp.bounds.program.slots import PlanarPose
 from guided_lgp.bounds.results import Array
-
-Reach = Callable[[Array], Array]
-"""Inverse kinematics of the whole grid at once, see :func:`guided_lgp.bounds.terms.hold.reach`."""
 
 
 class Draft:
@@ -24,8 +22,7 @@ class Draft:
         generator: np.random.Generator,
         noise: float,
         robot: RobotKinematics,
-        fixed: Sequence[float],
-        reach: Reach,
+        reach: Mapping[str, Reach],
     ) -> None:
         """Begin a start.
 
@@ -37,8 +34,7 @@ class Draft:
             generator: for placements and choices.
             noise: how far from the best candidates a choice may be (0: the best ones).
             robot: whose arms these are.
-            fixed: values of the joints that the scene sets.
-            reach: inverse kinematics.
+            reach: inverse kinematics of its arms, by gripper.
         """
         self.values = values
         self.lower = lower
@@ -46,7 +42,6 @@ class Draft:
         self.generator = generator
         self.noise = noise
         self.robot = robot
-        self.fixed = tuple(fixed)
         self.reach = reach
         self._variables = variables
 

@@ -35,8 +35,10 @@ class ArmPose:
 class Chain:
     """The joints from the robot's base link to a tool frame, and what is fixed to them."""
 
+    gripper: str
+    """At its end."""
     name: str
-    """Of the gripper at its end."""
+    """In the names of kernels, an identifier."""
     joints: tuple[Joint, ...]
     tool: tuple[Array, Array]
     """Rotation (3, 3) and position (3,) of the tool frame in the last link."""
@@ -121,8 +123,8 @@ def kinematics_of(robot: Robot) -> RobotKinematics:
     fixed = tuple(joint.joint for joint in robot.fixed_joints.values())
     joints = read_joints(robot.urdf)
     chains = {
-        gripper: _chain(robot, arm, fixed, joints)
-        for gripper, arm in robot.arms.items()
+        gripper: _chain(robot, arm, str(number), fixed, joints)
+        for number, (gripper, arm) in enumerate(robot.arms.items())
         if arm.mirror_of is None
     }
     arms = {}
@@ -139,9 +141,12 @@ def kinematics_of(robot: Robot) -> RobotKinematics:
     return RobotKinematics(robot, arms, fixed)
 
 
-def _chain(robot: Robot, arm: Arm, fixed: tuple[str, ...], joints: dict[str, Joint]) -> Chain:
+def _chain(
+    robot: Robot, arm: Arm, name: str, fixed: tuple[str, ...], joints: dict[str, Joint]
+) -> Chain:
     return Chain(
-        name=arm.gripper,
+        gripper=arm.gripper,
+        name=name,
         joints=tuple(path_between(joints, robot.base_link, arm.tool_link)),
         tool=(rotation_matrix(arm.tool_in_link[3:]), arm.tool_in_link[:3]),
         moving=arm.joints,

@@ -6,17 +6,14 @@ and of the far end of each straight way to it or from it.
 """
 
 from collections.abc import Iterable
-from functools import cache
-from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from guided_lgp import poses
-from guided_lgp.bounds.program.closed_form import human_like, inverse
 from guided_lgp.bounds.program.context import Context, Line
 from guided_lgp.bounds.program.draft import Draft
-from guided_lgp.bounds.program.kernels import SCALE, Kernel, absolute, kernel
+from guided_lgp.bounds.program.grasp import tool_target
+from guided_lgp.bounds.program.kernels import SCALE, Kernel, kernel
 from guided_lgp.bounds.program.kinematics import Chain, RobotKinematics
 from guided_lgp.bounds.program.slots import (
     ArmConfiguration,
@@ -26,44 +23,9 @@ from guided_lgp.bounds.program.slots import (
 )
 from guided_lgp.bounds.results import Array
 from guided_lgp.bounds.terms.term import Term, UngraspableError
-from guided_lgp.robots.inverse import inverse_kinematics
 
-PALM_GAP = 0.002
-"""Distance of the box's nearest corner from the palm (m)."""
 PAD_MARGIN = 0.01
 """How far inside the box's side the fingertips are (m)."""
-
-
-def tool_target(
-    pose: Any, height: Any, pitch: Any, offset: Any, p: Any, palm_front: float
-) -> tuple[Any, Any]:
-    """Where the tool must be to hold a level box.
-
-    The fingers close across the box's width; the approach axis lies in the vertical plane along
-    its length, ``pitch`` below the horizontal (pi/2: from above; beyond: from the other end). The
-    palm touches the box's nearest corner, ``offset`` moves the tool along its own z axis.
-
-    Args:
-        pose: (x, y, yaw) of the box.
-        height: z of its centre (m).
-        pitch: of the approach (rad), in [0, pi].
-        offset: along the tool's z axis (m).
-        p: (half length, half height, turn of the length against the box's x axis, distance back
-            along the approach).
-        palm_front: x of the palm's front in the tool frame (m).
-
-    Returns:
-        position (3,) and rotation (3, 3) of the tool.
-    """
-    half_length, half_height, turn, back = (p[i] for i in range(4))
-    heading = pose[2] + turn
-    ch, sh, cp, sp = ca.cos(heading), ca.sin(heading), ca.cos(pitch), ca.sin(pitch)
-    x_axis = ca.vertcat(ch * cp, sh * cp, -sp)
-    y_axis = ca.vertcat(-sh, ch, 0)
-    z_axis = ca.vertcat(ch * sp, sh * sp, cp)
-    reach = half_length * absolute(cp) + half_height * sp + palm_front + PALM_GAP
-    centre = ca.vertcat(pose[0], pose[1], height)
-    return centre - (reach + back) * x_axis - offset * z_axis, ca.horzcat(x_axis, y_axis, z_axis)
 
 
 def _kernel(chain: Chain, fixed: int) -> Kernel:
@@ -190,15 +152,6 @@ def _rows(
     )
 
 
-def in_tool(held: HeldBox, values: Array, chain: Chain) -> Array:
-    """Pose (7,) of a held box in the tool frame of its gripper."""
-    pitch, offset = values[held.pitch], values[held.offset]
-    reach = held.half_length * abs(np.cos(pitch)) + held.half_height * np.sin(pitch)
-    level = np.array([0.0, -np.sin(pitch / 2), 0.0, np.cos(pitch / 2)])
-    turned = poses.multiply(level, poses.pose((0, 0, 0), -held.turn)[3:])
-    return np.array([reach + chain.palm_front + PALM_GAP, 0.0, offset, *turned])
-
-
 # starts
 
 
@@ -257,8 +210,8 @@ def _solutions(
     """
     arm = draft.robot.arms[held.gripper]
     ends = np.array([(0.0, 0.0), *((segment.back, segment.up) for segment in segments)])
-    solve = _general if human_like(arm.chain) is None else _closed_form
-    joints, missing = solve(draft, held, poses, tried, ends)
+    offset = float(draft.values[held.offset])
+    joints, missing = draft.reach[held.gripper](held, offset, poses, tried, ends)
     low, high = np.array(arm.limits).T
     beyond = np.maximum(low - joints, 0) + np.maximum(joints - high, 0)
     motion = ((joints - arm.home) ** 2)[..., :_SHOULDER_JOINTS].sum(axis=-1)
@@ -266,66 +219,6 @@ def _solutions(
     return np.clip(joints, low, high), costs.sum(axis=2)
 
 
-def _closed_form(
-    draft: Draft, held: HeldBox, poses: Array, tried: Array, ends: Array
-) -> tuple[Array, Array]:
-    """Joints (poses, pitches, ends, candidates, n) of arms like the PR2's, and what is missing."""
-    shape = (len(poses), len(tried), len(ends), 2 * len(_PANS))
-    arguments = np.empty((*shape, REACH_INPUTS))
-    arguments[..., :4] = poses[:, None, None, None]
-    arguments[..., 4] = tried[:, None, None]
-    arguments[..., 5] = float(draft.values[held.offset])
-    arguments[..., 6] = np.tile(_PANS, 2)
-    arguments[..., 7] = np.repeat([1.0, -1.0], len(_PANS))
-    arguments[..., 8] = draft.robot.arms[held.gripper].side
-    arguments[..., 9] = draft.fixed[0]
-    arguments[..., 10] = ends[:, 1, None]
-    arguments[..., 11:14] = held.half_length, held.half_height, held.turn
-    arguments[..., 14] = ends[:, 0, None]
-    solutions = draft.reach(arguments.reshape(-1, REACH_INPUTS)).reshape(*shape, -1)
-    return solutions[..., :-1], solutions[..., -1]
-
-
-def _general(
-    draft: Draft, held: HeldBox, poses: Array, tried: Array, ends: Array
-) -> tuple[Array, Array]:
-    """The same for any arm: a candidate is a value of the redundant joint and a branch."""
-    arm = draft.robot.arms[held.gripper]
-    solver = inverse_kinematics(draft.robot.robot, held.gripper, draft.fixed)
-    rotation, position = _targets(draft, held, poses, tried, ends, arm.chain.palm_front)
-    values = solver.redundancies(_VALUES)
-    q, missing = solver.nearest(rotation[..., None, :, :], position[..., None, :], values)
-    q, missing = (
-        q.reshape(*position.shape[:-1], -1, q.shape[-1]),
-        missing.reshape(*position.shape[:-1], -1),
-    )
-    return q * arm.arm.signs, missing
-
-
-def _targets(
-    draft: Draft, held: HeldBox, poses: Array, tried: Array, ends: Array, palm_front: float
-) -> tuple[Array, Array]:
-    """Rotations (poses, pitches, ends, 3, 3) and origins (…, 3) of the tool."""
-    x = ca.SX.sym("x", 10)
-    position, rotation = tool_target(x[:3], x[3], x[4], x[5], x[6:10], palm_front)
-    targets = ca.Function("targets", [x], [position, ca.reshape(rotation, 9, 1)])
-    arguments = np.empty((len(poses), len(tried), len(ends), 10))
-    arguments[..., :4] = poses[:, None, None]
-    arguments[..., 3] += ends[:, 1]
-    arguments[..., 4] = tried[:, None]
-    arguments[..., 5] = float(draft.values[held.offset])
-    arguments[..., 6:9] = held.half_length, held.half_height, held.turn
-    arguments[..., 9] = ends[:, 0]
-    origins, columns = targets(arguments.reshape(-1, 10).T)
-    shape = arguments.shape[:-1]
-    rotations = np.array(columns).T.reshape(*shape, 3, 3)
-    return np.swapaxes(rotations, -1, -2), np.array(origins).T.reshape(*shape, 3)
-
-
-_PANS = np.linspace(-0.65, 1.6, 10)
-"""Values (rad) of the redundant joint that are tried: shoulder pan, left arm."""
-_VALUES = 10
-"""How many values of the redundant joint of other arms are tried."""
 _PITCHES = np.pi * np.array([0.2, 0.35, 0.5, 0.65, 0.8])
 """Pitches (rad) of the approach that are tried, from one end of the box over the top."""
 _PITCH_SPREAD = 0.4
@@ -338,25 +231,5 @@ _MOTION = 0.05
 """Cost per rad^2 of shoulder and elbow from the arm's side: only among what is reached."""
 _SHOULDER_JOINTS = 4
 """The joints that move most of the arm; the wrist turns at no cost."""
-REACH_INPUTS = 15
-
-
-@cache
-def reach_function(robot: RobotKinematics) -> Any | None:
-    """CasADi function of one closed-form inverse kinematics; None if a robot's arms have none.
-
-    Inputs (15,): pose (x, y, yaw) and height of the box, pitch, offset, shoulder pan, branch, side,
-    torso, lift above the box's place, half length, half height, turn, distance back.
-    Outputs (8,): joint values (mirrored for the right arm) and the distance missing to reach (m).
-    """
-    chain = robot.chains[0]
-    lengths = human_like(chain)
-    if lengths is None:
-        return None
-    x = ca.SX.sym("x", REACH_INPUTS)
-    position, rotation = tool_target(x[:3], x[3] + x[10], x[4], x[5], x[11:15], chain.palm_front)
-    solution = inverse(lengths, position, rotation, x[6], x[7], x[8], x[9])
-    return ca.Function("reach", [x], [solution])
-
 
 TERM = Term(_add, _kernels)

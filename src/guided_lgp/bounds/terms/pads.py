@@ -3,9 +3,10 @@
 import casadi as ca
 
 from guided_lgp.bounds.program.context import Context
+from guided_lgp.bounds.program.grasp import tool_target
 from guided_lgp.bounds.program.kernels import SCALE, Kernel, kernel
 from guided_lgp.bounds.program.kinematics import Chain, RobotKinematics
-from guided_lgp.bounds.terms.hold import PAD_MARGIN, grip, tool_target
+from guided_lgp.bounds.terms.hold import PAD_MARGIN, grip
 from guided_lgp.bounds.terms.term import Term
 
 PAD_CENTRE = -0.02

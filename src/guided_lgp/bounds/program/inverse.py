@@ -1,0 +1,173 @@
+"""Inverse kinematics for starts: over a grid of poses, pitches and candidates at once.
+
+Arms built like a human's are solved by formulas of their own, as compiled code; others by the
+general inverse kinematics.
+"""
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any, Protocol
+
+import casadi as ca
+import numpy as np
+
+from guided_lgp.bounds.program.closed_form import HumanLike, human_like, inverse
+from guided_lgp.bounds.program.grasp import tool_target, tool_targets
+from guided_lgp.bounds.program.kinematics import ArmKinematics, Chain, RobotKinematics
+from guided_lgp.bounds.program.slots import HeldBox
+from guided_lgp.bounds.results import Array
+from guided_lgp.robots import Robot
+from guided_lgp.robots.inverse import inverse_kinematics
+
+INPUTS = 15
+"""Arguments of a closed form, see :func:`_closed_form`."""
+_PANS = np.linspace(-0.65, 1.6, 10)
+"""Values (rad) of the shoulder's pan that are tried, left arm: from the middle to its own side."""
+_VALUES = 6
+"""Values of the redundant joint of any other arm, spread over its range."""
+_TURN = 2 * np.pi
+
+Evaluate = Callable[[str, Array], Array]
+"""Runs the closed form of a chain: its name and arguments (count, 15) to (count, n + 1)."""
+
+
+class Reach(Protocol):
+    """Inverse kinematics of one arm for starts, in the convention of its chain."""
+
+    def __call__(
+        self, held: HeldBox, offset: float, poses: Array, pitches: Array, ends: Array
+    ) -> tuple[Array, Array]:
+        """Hold a box at poses.
+
+        Args:
+            held: the grasp's lengths and turn.
+            offset: of the tool along its z axis (m).
+            poses: (N, 4) x, y, yaw and z of the box.
+            pitches: (M,) of the approach (rad).
+            ends: (E, 2) back along the approach and up (m); the first is the contact.
+
+        Returns:
+            joints (N, M, E, candidates, n), perhaps beyond limits, and missing (N, M, E,
+            candidates), how far (m) the tool is from its target. One candidate is one motion.
+        """
+        ...
+
+
+class ClosedForm:
+    """By the formulas of a human-like arm, for several pans and both elbows."""
+
+    def __init__(self, arm: ArmKinematics, lifted: float, evaluate: Evaluate) -> None:
+        self._arm = arm
+        self._lifted = lifted
+        self._evaluate = evaluate
+
+    def __call__(
+        self, held: HeldBox, offset: float, poses: Array, pitches: Array, ends: Array
+    ) -> tuple[Array, Array]:
+        """See :class:`Reach`."""
+        shape = (len(poses), len(pitches), len(ends), 2 * len(_PANS))
+        arguments = np.empty((*shape, INPUTS))
+        arguments[..., :4] = poses[:, None, None, None]
+        arguments[..., 4] = pitches[:, None, None]
+        arguments[..., 5] = offset
+        arguments[..., 6] = np.tile(_PANS, 2)
+        arguments[..., 7] = np.repeat([1.0, -1.0], len(_PANS))
+        arguments[..., 8] = self._arm.side
+        arguments[..., 9] = self._lifted
+        arguments[..., 10] = ends[:, 1, None]
+        arguments[..., 11:14] = held.half_length, held.half_height, held.turn
+        arguments[..., 14] = ends[:, 0, None]
+        found = self._evaluate(self._arm.chain.name, arguments.reshape(-1, INPUTS))
+        solutions = found.reshape(*shape, -1)
+        return solutions[..., :-1], solutions[..., -1]
+
+
+class General:
+    """By the general inverse kinematics, for several values of a redundant joint."""
+
+    def __init__(self, robot: Robot, arm: ArmKinematics, fixed: tuple[float, ...]) -> None:
+        self._arm = arm.arm
+        self._low, self._high = arm.arm.limits.T
+        self._solver = inverse_kinematics(robot, arm.arm.gripper, fixed)
+        self._values = self._solver.redundancies(_VALUES)
+
+    def __call__(
+        self, held: HeldBox, offset: float, poses: Array, pitches: Array, ends: Array
+    ) -> tuple[Array, Array]:
+        """See :class:`Reach`; every branch at the contact goes on on the nearest at the ends."""
+        rotation, position = tool_targets(held, offset, poses, pitches, ends, self._arm.palm_front)
+        q, missing = self._solver.nearest(
+            rotation[..., None, :, :], position[..., None, :], self._values
+        )
+        joints, lost = self._followed(q, missing)
+        candidates = (*joints.shape[:3], -1)
+        joints = self._arm.signs * joints  # in the convention of the chain
+        return joints.reshape(*candidates, joints.shape[-1]), lost.reshape(candidates)
+
+    def _followed(self, q: Array, missing: Array) -> tuple[Array, Array]:
+        """For every branch at the contact, the nearest one at each end.
+
+        Args:
+            q: (N, M, E, values, branches, n) solutions.
+            missing: (N, M, E, values, branches) how far they are off.
+        """
+        contact, others = q[:, :, :1, :, :, None], q[:, :, :, :, None]
+        near = others + _TURN * np.round((contact - others) / _TURN)
+        near = np.where((near >= self._low) & (near <= self._high), near, others)
+        lost = np.broadcast_to(missing[:, :, :, :, None], near.shape[:-1])
+        distance = np.abs(near - contact).sum(axis=-1) + _LOST * lost
+        best = np.argmin(distance, axis=-1)[..., None]
+        joints = np.take_along_axis(near, best[..., None], axis=-2)[..., 0, :]
+        return joints, np.take_along_axis(lost, best, axis=-1)[..., 0]
+
+
+_LOST = 100.0
+"""Weight (rad/m) of what is missing against the way from the contact, in choosing branches."""
+
+
+def reaches(
+    kinematics: RobotKinematics, fixed: tuple[float, ...], evaluate: Evaluate
+) -> dict[str, Reach]:
+    """The inverse kinematics of every arm, by gripper.
+
+    Args:
+        kinematics: of the robot.
+        fixed: values of the joints that the scene sets.
+        evaluate: runs closed forms.
+    """
+    forms = closed_forms(kinematics)
+    return {
+        gripper: ClosedForm(arm, _lifted(arm.chain, fixed), evaluate)
+        if arm.chain.name in forms
+        else General(kinematics.robot, arm, fixed)
+        for gripper, arm in kinematics.arms.items()
+    }
+
+
+def _lifted(chain: Chain, fixed: tuple[float, ...]) -> float:
+    """How far (m) the joints that the scene sets raise the shoulder."""
+    on_chain = {joint.name for joint in chain.joints}
+    return sum(value for name, value in zip(chain.fixed, fixed, strict=True) if name in on_chain)
+
+
+@cache
+def closed_forms(kinematics: RobotKinematics) -> dict[str, Any]:
+    """The closed forms of those chains of a robot that have one, by the chain's name."""
+    return {
+        chain.name: _closed_form(chain, lengths)
+        for chain in kinematics.chains
+        if (lengths := human_like(chain)) is not None
+    }
+
+
+def _closed_form(chain: Chain, lengths: HumanLike) -> Any:
+    """CasADi function of one closed-form inverse kinematics.
+
+    Inputs (15,): pose (x, y, yaw) and height of the box, pitch, offset, shoulder pan, branch, side,
+    lift of the shoulder, lift above the box's place, half length, half height, turn, distance back.
+    Outputs (8,): joint values (mirrored for a mirror image) and the distance missing to reach (m).
+    """
+    x = ca.SX.sym("x", INPUTS)
+    position, rotation = tool_target(x[:3], x[3] + x[10], x[4], x[5], x[11:15], chain.palm_front)
+    solution = inverse(lengths, position, rotation, x[6], x[7], x[8], x[9])
+    return ca.Function(f"reach_{chain.name}", [x], [solution])
