@@ -67,6 +67,6 @@ def assemble(robot: Robot, start: Situation, steps: Iterable[Step]) -> Trajector
 def _ramp(joints: FingerJoints, start: Array, value: float) -> tuple[Array, Array]:
     """Times and values (T, n) of fingers that go from joint values to one value."""
     end = joints.ratios * value
-    duration = float(np.max(np.abs(end - start))) / (_FINGER_SHARE * joints.velocity)
+    duration = float(np.abs(end - start).max(initial=0.0)) / (_FINGER_SHARE * joints.velocity)
     count = 1 + int(np.ceil(duration / INTERVAL))
     return np.linspace(0.0, duration, count), np.linspace(start, end, count)
