@@ -29,12 +29,6 @@ def changed(tmp_path: Path, name: str, arm: str, **fields: object) -> Path:
             del data["arms"][arm][field]
         else:
             data["arms"][arm][field] = value
-    description = data["description"]
-    for key in ("urdf", "srdf"):
-        if "package" not in description:
-            description[key] = str((_FOLDER / description[key]).resolve())
-    for package, folder in description.get("packages", {}).items():
-        description["packages"][package] = str((_FOLDER / folder).resolve())
     file = tmp_path / "robot.yaml"
     file.write_text(yaml.safe_dump(data, sort_keys=False))
     return file
@@ -92,14 +86,6 @@ def test_an_arm_that_is_no_mirror_image_is_named(tmp_path: Path) -> None:
     file = changed(tmp_path, "pr2", "pr2R", **arms)
     with pytest.raises(InputError, match=r"arms.pr2R.mirrors: is no mirror image of pr2L"):
         load_robot(str(file))
-
-
-def test_stated_measures_go_before_derived_ones(tmp_path: Path) -> None:
-    arms = {"hand_radius": 0.2, "lever_arms": [1.0] * 7}
-    arm = load_robot(str(changed(tmp_path, "panda", "panda", **arms))).arms["panda"]
-    assert arm.hand_radius == 0.2
-    assert arm.lever_arms.tolist() == [1.0] * 7
-    assert arm.palm_front == load_robot("panda").arms["panda"].palm_front
 
 
 def test_soft_limits_count_unless_the_file_says_otherwise(tmp_path: Path) -> None:
