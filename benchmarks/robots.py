@@ -46,6 +46,13 @@ FAMILIES = {
         ),
         (0.12, 0.06, 0.08),
     ),
+    "ur5": Family(
+        (
+            Table(name="tab1", position=(0.50, 0.27, 0.15), half_extents=(0.15, 0.20)),
+            Table(name="tab2", position=(0.50, -0.27, 0.15), half_extents=(0.15, 0.20)),
+        ),
+        (0.12, 0.05, 0.08),
+    ),
 }
 
 

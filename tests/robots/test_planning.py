@@ -15,8 +15,8 @@ from guided_lgp.robots import load_robot
 from guided_lgp.scene import Box, PlacedRobot, Scene, Table
 from guided_lgp.scene.validate import validate_scene
 
-_WIDTHS = {"panda": 0.06}
-"""Of the boxes (m), by robot."""
+_WIDTHS = {"panda": 0.06, "ur5": 0.05}
+"""Of the boxes (m), by robot: the UR5's jaws do not move."""
 
 
 def scene(robot: str, base: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Scene:
