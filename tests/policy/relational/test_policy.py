@@ -25,7 +25,8 @@ from guided_lgp.logic import (
     successor,
 )
 from guided_lgp.policy.registry import load_policy
-from guided_lgp.policy.relational.encoding import Range, applicable, graphs, situation
+from guided_lgp.policy.relational.encoding import Range, graphs, situation
+from guided_lgp.policy.relational.heads import heads
 from guided_lgp.policy.relational.inference import RelationalPolicy, load_relational
 from guided_lgp.policy.relational.model import Model, Weights, shapes
 from guided_lgp.policy.relational.network import RelationalNetwork
@@ -85,13 +86,13 @@ def renamed(problem: Problem, names: dict[str, str]) -> Problem:
 def network() -> RelationalNetwork:
     with torch.random.fork_rng():
         torch.manual_seed(3)
-        return RelationalNetwork(width=12, rounds=2)
+        return RelationalNetwork(12, 2, heads(load_domain()))
 
 
 @pytest.fixture(scope="module")
 def weights(network: RelationalNetwork) -> Weights:
     tensors = {name: part.numpy().copy() for name, part in network.state_dict().items()}
-    return Weights(LIMITS, tensors)
+    return Weights(LIMITS, tensors, load_domain())
 
 
 @pytest.fixture(scope="module")
@@ -154,17 +155,23 @@ def test_torch_and_numpy_agree_and_know_the_applicable_actions(
     one = situation(problem.objective, problem.state, problem.positions, symbols)
     inputs = graphs(one, LIMITS)
     nodes, edges, held = (
-        torch.from_numpy(array[0]) for array in (inputs.nodes, inputs.edges, inputs.held)
+        torch.from_numpy(array)
+        for array in (inputs.nodes[0], np.repeat(inputs.edges, 2, axis=0), inputs.held[0])
     )
     with torch.no_grad():
         expected = network(nodes, edges, held).numpy()
-    chosen = np.where(held[:, None] < 0, expected[:, 0], expected[:, 1])
-    np.testing.assert_allclose(weights.scores(inputs)[0], chosen, atol=1e-5)
-    allowed = {
-        (symbols.grippers.index(a.gripper), symbols.tables.index(a.table or a.box))
-        for a in problem.actions
-    }
-    assert {tuple(row) for row in np.argwhere(applicable(one, inputs)[0])} == allowed
+    scores = weights.scores(inputs)
+    for number, (name, head) in enumerate(heads(symbols.domain).items()):
+        applicable = head.applicable(one, inputs)[0]
+        np.testing.assert_allclose(
+            scores[name][applicable], expected[:, number][applicable], atol=1e-6
+        )
+        allowed = {
+            (symbols.grippers.index(a.symbols[0]), symbols.tables.index(a.symbols[-1]))
+            for a in problem.actions
+            if a.instruction == name
+        }
+        assert {tuple(row) for row in np.argwhere(applicable)} == allowed
 
 
 def test_what_lies_outside_the_range_of_training_looks_like_its_border(
@@ -193,7 +200,7 @@ def test_files_are_read_back_without_torch(models: Path, policy: RelationalPolic
 
 def test_shapes_are_those_of_the_network(network: RelationalNetwork) -> None:
     parts = {name: tuple(part.shape) for name, part in network.state_dict().items()}
-    assert shapes(width=12, rounds=2) == parts
+    assert shapes(12, 2, heads(load_domain())) == parts
 
 
 @pytest.fixture
@@ -204,14 +211,14 @@ def copy(models: Path, tmp_path: Path) -> Path:
 @pytest.mark.parametrize(
     ("field", "value", "fault"),
     [
-        ("version", 99, "version: is 99"),
+        ("version", 99, "version: input should be 1"),
         ("nodes", ["x"], "nodes, edges: are not what this program encodes"),
-        ("limits", {"lower": [0, 0, 0], "upper": [1, 0, 1]}, "limits: are not a range"),
-        ("limits", {"lower": [0], "upper": [1]}, "limits: are not a range"),
-        ("limits", {"lower": "abc", "upper": [1, 1, 1]}, "limits: are not a range"),
-        ("limits", None, "limits: are not a range"),
-        ("width", 1.5, "width, rounds: are 1.5, 2"),
-        ("rounds", 10**9, "width, rounds: are 12, 1000000000"),
+        ("limits", {"lower": [0, 0, 0], "upper": [1, 0, 1]}, "limits"),
+        ("limits", {"lower": [0], "upper": [1]}, "limits"),
+        ("limits", {"lower": "abc", "upper": [1, 1, 1]}, "limits"),
+        ("limits", None, "limits"),
+        ("width", 1.5, "width: input should be a valid integer"),
+        ("rounds", 10**9, "rounds: input should be less than or equal to 1024"),
         ("width", 13, "does not have the weights that its JSON describes"),
     ],
 )

@@ -11,7 +11,8 @@ from guided_lgp.errors import InputError
 from guided_lgp.params import Parallel, TrainRelational
 from guided_lgp.policy.paper.dataset import Dataset
 from guided_lgp.policy.paper.samples import build_dataset
-from guided_lgp.policy.relational.encoding import NO_GOAL, Range, applicable, graphs
+from guided_lgp.policy.relational.encoding import NO_GOAL, Range, graphs
+from guided_lgp.policy.relational.heads import heads
 from guided_lgp.policy.relational.samples import Examples, examples, own_side, supports_first
 from guided_lgp.policy.relational.train import train_relational
 from guided_lgp.policy.relational.training import fit
@@ -34,11 +35,17 @@ def problems(dataset: Dataset) -> Examples:
     return examples(dataset)
 
 
+def applicable(problems: Examples) -> np.ndarray:
+    inputs = graphs(problems.situations, Range.of(problems.situations))
+    allowed = [h.applicable(problems.situations, inputs) for h in heads(problems.domain).values()]
+    return np.logical_or.reduce(allowed)
+
+
 def test_problems_are_distinct_and_know_every_sample(dataset: Dataset, problems: Examples) -> None:
     situations = problems.situations
     keys = np.column_stack([problems.configuration, situations.supports, situations.goals])
     assert len(np.unique(keys, axis=0)) == len(keys)
-    allowed = applicable(situations, graphs(situations, Range.of(situations)))
+    allowed = applicable(problems)
     assert problems.right.any(axis=(1, 2)).all()
     assert not (problems.right & ~allowed).any()
     preferred = supports_first(situations) & own_side(situations)
@@ -80,9 +87,7 @@ def test_a_few_problems_are_learnt_by_heart(problems: Examples) -> None:
 
 def test_shuffled_labels_fall_to_chance(problems: Examples) -> None:
     rng = np.random.default_rng(8)
-    allowed = applicable(
-        problems.situations, graphs(problems.situations, Range.of(problems.situations))
-    )
+    allowed = applicable(problems)
     noise = np.where(allowed, rng.random(allowed.shape), -1).reshape(len(allowed), -1)
     right = np.zeros_like(noise, dtype=bool)
     right[np.arange(len(right)), noise.argmax(axis=1)] = True

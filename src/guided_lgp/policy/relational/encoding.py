@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from guided_lgp.logic import Objective, State, Symbols
+from guided_lgp.logic import Domain, Objective, State, Symbols
 from guided_lgp.policy.arrays import BoolArray, FloatArray, IntArray
 
 NO_GOAL = -1
@@ -45,17 +45,20 @@ NODE_FEATURES = (
 )
 """Inputs of every node; the last two are the same for all nodes of a graph."""
 
+STANDS_ON, CARRIED = "stands on", "carries"
 EDGE_FEATURES = (
-    "stands on",
-    "carries",
+    STANDS_ON,
+    CARRIED,
     "stands on, directly or through others",
     CARRIES_ABOVE,
     "shall stand on",
 )
 """Inputs of every ordered pair of nodes, from the first one's point of view."""
 
-SIDES = (1.0, -1.0)
-"""Sign of y on each gripper's own side: the grippers are declared left, then right."""
+
+def sides(grippers: int) -> FloatArray:
+    """Sign of y on each gripper's own side: they are declared left, then right."""
+    return np.resize(np.array([1, -1], dtype=np.float32), grippers)
 
 
 @dataclass(frozen=True)
@@ -71,9 +74,11 @@ class Situations:
     """(B, n) what each box stands on; -1 - g when held by gripper g."""
     goals: IntArray
     """(B, n) what each box shall stand on, or :data:`GOAL_HELD`, or :data:`NO_GOAL`."""
+    grippers: int
 
     def __getitem__(self, rows: IntArray | BoolArray) -> "Situations":
-        return Situations(self.positions[rows], self.supports[rows], self.goals[rows])
+        positions, supports = self.positions[rows], self.supports[rows]
+        return Situations(positions, supports, self.goals[rows], self.grippers)
 
 
 @dataclass(frozen=True)
@@ -83,9 +88,15 @@ class Graphs:
     nodes: FloatArray
     """(B, G, T, node features)."""
     edges: FloatArray
-    """(B, G, T, T, edge features)."""
+    """(B, T, T, edge features), the same for all grippers."""
     held: IntArray
     """(B, G) the table number of the box that the gripper holds, or -1."""
+
+    def carried_by(self, tables: IntArray) -> BoolArray:
+        """(B, G, T) what stands on (B, G) tables, directly or through others."""
+        carried = self.edges[..., EDGE_FEATURES.index(CARRIES_ABOVE)] > 0
+        found: BoolArray = np.take_along_axis(carried, tables[..., None], axis=1)
+        return found
 
 
 @dataclass(frozen=True)
@@ -133,21 +144,29 @@ def situation(
     number = {name: index for index, name in enumerate(tables)}
     number |= {name: -1 - index for index, name in enumerate(symbols.grippers)}
     place = {box: number[where] for box, where in state.support + state.held}
-    goals = {
-        goal.box: GOAL_HELD if goal.table is None else number[goal.table] for goal in objective
+    goals = {goal.symbols[0]: number.get(goal.symbols[-1], NO_GOAL) for goal in objective}
+    goals |= {
+        goal.symbols[0]: GOAL_HELD for goal in objective if is_held(symbols.domain, goal.kind)
     }
     return Situations(
         positions=np.array([[positions[name] for name in tables]], dtype=np.float32),
         supports=np.array([[place[box] for box in symbols.boxes]]),
         goals=np.array([[goals.get(box, NO_GOAL) for box in symbols.boxes]]),
+        grippers=len(symbols.grippers),
     )
+
+
+def is_held(domain: Domain, kind: str) -> bool:
+    """Whether a goal of this type is that its body is held."""
+    (condition,) = next(goal.condition for goal in domain.goal_types if goal.name == kind)
+    return condition.predicate == "held"
 
 
 def graphs(situations: Situations, limits: Range) -> Graphs:
     """Build the graphs of all problems, one per gripper."""
     supports, goals = situations.supports, situations.goals
     boxes, tables = supports.shape[1], situations.positions.shape[1]
-    holder = np.stack([supports == -1 - gripper for gripper in range(len(SIDES))], axis=1)
+    holder = np.stack([supports == -1 - gripper for gripper in range(situations.grippers)], axis=1)
     free: BoolArray = ~np.logical_or.reduce(holder, axis=2)
 
     holds = np.where(goals == GOAL_HELD, supports < 0, supports == goals)
@@ -175,7 +194,7 @@ def graphs(situations: Situations, limits: Range) -> Graphs:
         _any(carried, of_tables(goal_open)),
     ]
     by_gripper = []
-    for gripper, side in enumerate(SIDES):
+    for gripper, side in enumerate(sides(situations.grippers)):
         mirror = np.array([1, side, 1], dtype=np.float32)
         position = limits.scaled(situations.positions * mirror)
         position *= 1 - in_hand[..., None]  # whose hand it is says more
@@ -188,20 +207,9 @@ def graphs(situations: Situations, limits: Range) -> Graphs:
     relations = np.stack([on, np.swapaxes(on, 1, 2), above, carried, shall], axis=-1)
     return Graphs(
         nodes=np.stack(by_gripper, axis=1),
-        edges=np.repeat(relations[:, None], len(SIDES), axis=1),
+        edges=relations,
         held=np.where(free, -1, holder.argmax(axis=2) + tables - boxes),
     )
-
-
-def applicable(situations: Situations, inputs: Graphs) -> BoolArray:
-    """(B, G, T) what each gripper can do: grasp a box, or place what it holds on a table."""
-    count, _, tables, _ = inputs.nodes.shape
-    graspable = np.zeros((count, 1, tables), dtype=bool)
-    graspable[:, 0, tables - situations.supports.shape[1] :] = situations.supports >= 0
-    held = inputs.held[..., None]
-    carried = inputs.edges[..., EDGE_FEATURES.index(CARRIES_ABOVE)] > 0
-    barred = np.take_along_axis(carried, held[..., None], axis=2)[:, :, 0]
-    return np.where(held < 0, graspable, ~barred & (np.arange(tables) != held))
 
 
 def _relation(targets: IntArray, tables: int) -> FloatArray:
@@ -213,11 +221,11 @@ def _relation(targets: IntArray, tables: int) -> FloatArray:
 
 
 def _closure(relation: FloatArray) -> FloatArray:
-    """The transitive closure, by squaring."""
-    length = 1
-    while length < relation.shape[1]:
-        relation = np.minimum(relation + relation @ relation, 1)
-        length *= 2
+    """The transitive closure, by squaring until nothing is new."""
+    wider = np.minimum(relation + relation @ relation, 1)
+    while (wider != relation).any():
+        relation = wider
+        wider = np.minimum(relation + relation @ relation, 1)
     return relation
 
 

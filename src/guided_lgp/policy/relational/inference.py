@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from guided_lgp.logic import Action, Objective, State
 from guided_lgp.policy.relational.encoding import graphs, situation
+from guided_lgp.policy.relational.heads import heads
 from guided_lgp.policy.relational.model import Weights, load_weights
 from guided_lgp.policy.symbols import declared_symbols
 
@@ -28,11 +29,18 @@ class RelationalPolicy:
         """Score applicable actions; see :class:`guided_lgp.search.policy.Policy`."""
         symbols = declared_symbols(state, positions)
         problem = situation(objective, state, positions, symbols)
-        scores = self._weights.scores(graphs(problem, self._weights.limits))[0]
+        scores = self._weights.scores(graphs(problem, self._weights.limits))
         gripper = {name: row for row, name in enumerate(symbols.grippers)}
         table = {name: column for column, name in enumerate(symbols.tables)}
+        known = heads(self._weights.domain)
         own = np.array(
-            [scores[gripper[a.gripper], table[a.table or a.box]] for a in actions], dtype=float
+            [
+                scores[a.instruction][
+                    gripper[a.symbols[0]], table[known[a.instruction].target_of(a)]
+                ]
+                for a in actions
+            ],
+            dtype=float,
         )
         own -= own.max()
         log_p: NDArray[np.float64] = own - np.log(np.exp(own).sum())

@@ -3,22 +3,25 @@
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic_core import PydanticCustomError
 from safetensors import SafetensorError
 from safetensors.numpy import load_file, save
 
 from guided_lgp.documents import read_json, write_json, written_whole
+from guided_lgp.domains import PAPER, load_domain
 from guided_lgp.errors import InputError
-from guided_lgp.policy.arrays import FloatArray
+from guided_lgp.logic import Domain
+from guided_lgp.policy.arrays import BoolArray, FloatArray
 from guided_lgp.policy.relational.encoding import EDGE_FEATURES, NODE_FEATURES, Graphs, Range
+from guided_lgp.policy.relational.heads import Head, heads
 
 VERSION = 1
 NAME = "relational"
 _REMEDY = f"version {VERSION}, the output of the stage train_relational"
-_LARGEST = 1024
-"""Width and rounds that a file may name."""
 
 
 @dataclass(frozen=True)
@@ -28,6 +31,8 @@ class Weights:
     limits: Range
     """Of the positions in training."""
     tensors: Mapping[str, FloatArray]
+    domain: Domain
+    """Whose instructions have heads."""
 
     @property
     def width(self) -> int:
@@ -39,30 +44,31 @@ class Weights:
         """Rounds of message passing."""
         return sum(name.startswith("send.") for name in self.tensors)
 
-    def scores(self, graphs: Graphs) -> FloatArray:
-        """Scores of all actions; the counterpart of the network in torch.
+    def scores(self, graphs: Graphs) -> dict[str, FloatArray]:
+        """Scores of all actions of one problem; the counterpart of the network in torch.
 
         Returns:
-            (B, G, T): of grasping each table by a gripper that is free, or of placing on each
-            what it holds.
+            For every instruction (G, T): of each table as its target, by each gripper. Those of a
+            gripper that holds nothing mean nothing where the instruction needs something held.
         """
-        state = _relu(self._linear("embed", graphs.nodes))
+        state = _relu(self._linear("embed", graphs.nodes[0]))
+        edges, held = graphs.edges[0], graphs.held[0]
+        related = edges.any(axis=2)
         for index in range(self.rounds):
-            sent = self._linear(f"send.{index}", state)[:, :, None]
-            said = (sent + self._linear(f"edge.{index}", graphs.edges)).max(axis=3)
+            sent = self._linear(f"send.{index}", state)
+            along = self._linear(f"edge.{index}", edges[related])
+            said = largest_messages(sent, related, along)
             heard = _relu(self._linear(f"receive.{index}", state) + said)
             hidden = self._linear(f"hidden.{index}", np.concatenate([state, heard], axis=-1))
             state = state + self._linear(f"update.{index}", _relu(hidden))
-        whole = _relu(self._linear("pool", state)).max(axis=2, keepdims=True)
-        parts = [state, np.broadcast_to(whole, state.shape)]
-        grasp = self._head("grasp", parts)
-        held = graphs.held[..., None, None]
-        if (held < 0).all():
-            return grasp
-        in_hand = np.take_along_axis(state, held, axis=2)
-        edges = np.take_along_axis(graphs.edges, held[..., None], axis=2)[:, :, 0]
-        place = self._head("place", [*parts, np.broadcast_to(in_hand, state.shape), edges])
-        return np.where(held[..., 0] < 0, grasp, place)
+        whole = _relu(self._linear("pool", state)).max(axis=1, keepdims=True)
+        in_hand = np.take_along_axis(state, held[:, None, None], axis=1)
+        free = [state, np.broadcast_to(whole, state.shape)]
+        full = [*free, np.broadcast_to(in_hand, state.shape), edges[held]]
+        return {
+            name: self._head(name, full if head.holds else free)
+            for name, head in heads(self.domain).items()
+        }
 
     def _head(self, name: str, parts: list[FloatArray]) -> FloatArray:
         hidden = _relu(self._linear(f"{name}.0", np.concatenate(parts, axis=-1)))
@@ -74,19 +80,59 @@ class Weights:
         return outputs if bias is None else outputs + bias
 
 
+def largest_messages(sent: FloatArray, related: BoolArray, along: FloatArray) -> FloatArray:
+    """The largest message that every node gets, without looking at every pair of nodes.
+
+    Args:
+        sent: (G, T, W) what every node says to all.
+        related: (T, T) whether a node (row) is related to another (column): few are, and no node to
+            itself.
+        along: (relations, W) what a relation adds, in the order of ``np.nonzero(related)``.
+
+    Returns:
+        (G, T, W).
+    """
+    said = _largest_unrelated(sent, related)
+    rows, columns = np.nonzero(related)
+    if len(rows):
+        first = np.flatnonzero(np.diff(rows, prepend=-1))
+        near = np.maximum.reduceat(sent[:, columns] + along, first, axis=1)
+        said[:, rows[first]] = np.maximum(said[:, rows[first]], near)
+    return said
+
+
+def _largest_unrelated(sent: FloatArray, related: BoolArray) -> FloatArray:
+    """(G, T, W) the largest of what is sent by nodes to which a node is not related.
+
+    That is the largest of all, or else the next largest, and so on: to itself it is not related.
+    """
+    by_size = np.argsort(-sent, axis=1)
+    chosen = np.repeat(by_size[:, :1], len(related), axis=1)
+    node, gripper, part = np.nonzero(related[:, by_size[:, 0]])
+    rank = 0
+    while len(node):
+        rank += 1
+        sender = by_size[gripper, rank, part]
+        chosen[gripper, node, part] = sender
+        barred = related[node, sender]
+        node, gripper, part = node[barred], gripper[barred], part[barred]
+    return np.take_along_axis(sent, chosen, axis=1)
+
+
 def _relu(values: FloatArray) -> FloatArray:
     return np.maximum(values, 0)
 
 
-def shapes(width: int, rounds: int) -> dict[str, tuple[int, ...]]:
+def shapes(width: int, rounds: int, heads: Mapping[str, Head]) -> dict[str, tuple[int, ...]]:
     """The shape of every parameter of a network."""
     nodes, edges = len(NODE_FEATURES), len(EDGE_FEATURES)
     layers = {"embed": (width, nodes), "pool": (width, width)}
     for index in range(rounds):
         layers[f"receive.{index}"] = layers[f"update.{index}"] = (width, width)
         layers[f"hidden.{index}"] = (width, 2 * width)
-    for head, inputs in (("grasp", 2 * width), ("place", 3 * width + edges)):
-        layers |= {f"{head}.0": (width, inputs), f"{head}.2": (1, width)}
+    for name, head in heads.items():
+        inputs = 3 * width + edges if head.holds else 2 * width
+        layers |= {f"{name}.0": (width, inputs), f"{name}.2": (1, width)}
     parts: dict[str, tuple[int, ...]] = {f"{name}.weight": size for name, size in layers.items()}
     parts |= {f"{name}.bias": size[:1] for name, size in layers.items()}
     for index in range(rounds):
@@ -110,6 +156,7 @@ class Model:
         document = {
             "version": VERSION,
             "network": NAME,
+            **({} if self.weights.domain.name == PAPER else {"domain": self.weights.domain.name}),
             "width": self.weights.width,
             "rounds": self.weights.rounds,
             "nodes": list(NODE_FEATURES),
@@ -122,6 +169,35 @@ class Model:
         write_json(directory / f"{NAME}.json", document)
 
 
+class _Limits(BaseModel):
+    model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
+
+    lower: Annotated[list[float], Field(min_length=3, max_length=3)]
+    upper: Annotated[list[float], Field(min_length=3, max_length=3)]
+
+    @model_validator(mode="after")
+    def _ordered(self) -> "_Limits":
+        if not all(low < high for low, high in zip(self.lower, self.upper, strict=True)):
+            raise PydanticCustomError("range", "are not a range of x, y and z")
+        return self
+
+
+class _Document(BaseModel):
+    """The JSON file of a network."""
+
+    model_config = ConfigDict(strict=True, extra="forbid")
+
+    version: Literal[1]
+    network: Literal["relational"]
+    domain: str = PAPER
+    width: Annotated[int, Field(ge=1, le=1024)]
+    rounds: Annotated[int, Field(ge=1, le=1024)]
+    nodes: list[str]
+    edges: list[str]
+    limits: _Limits
+    training: dict[str, Any]
+
+
 def load_weights(directory: Path) -> Weights:
     """Read the weights that :meth:`Model.save` wrote.
 
@@ -129,31 +205,26 @@ def load_weights(directory: Path) -> Weights:
         InputError: a file is missing, damaged, of another version or for another encoding.
     """
     path = directory / f"{NAME}.json"
-    document = read_json(path, _REMEDY)
-    version = document.get("version") if isinstance(document, dict) else None
-    if version != VERSION:
-        raise InputError(f"{path}: version", f"is {version!r}", _REMEDY)
-    if document.get("nodes") != list(NODE_FEATURES) or document.get("edges") != list(EDGE_FEATURES):
-        raise InputError(f"{path}: nodes, edges", "are not what this program encodes", _REMEDY)
     try:
-        limits = Range(**{name: tuple(map(float, v)) for name, v in document["limits"].items()})
-        ordered = all(low < high for low, high in zip(limits.lower, limits.upper, strict=True))
-    except (AttributeError, KeyError, TypeError, ValueError):
-        ordered = False
-    if not ordered or len(limits.lower) != 3:
-        raise InputError(f"{path}: limits", "are not a range of x, y and z", _REMEDY)
-    width, rounds = document.get("width"), document.get("rounds")
-    if not all(type(value) is int and 1 <= value <= _LARGEST for value in (width, rounds)):
-        raise InputError(f"{path}: width, rounds", f"are {width!r}, {rounds!r}", _REMEDY)
+        document = _Document.model_validate(read_json(path, _REMEDY))
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"]))
+        raise InputError(f"{path}: {where}", first["msg"].lower(), _REMEDY) from None
+    if (document.nodes, document.edges) != (list(NODE_FEATURES), list(EDGE_FEATURES)):
+        raise InputError(f"{path}: nodes, edges", "are not what this program encodes", _REMEDY)
+    limits = Range(tuple(document.limits.lower), tuple(document.limits.upper))
+    domain = load_domain(document.domain)
     path = directory / f"{NAME}.safetensors"
     try:
         tensors = load_file(path)
     except (OSError, SafetensorError) as error:
         fault = "is missing" if isinstance(error, FileNotFoundError) else "is damaged"
         raise InputError(str(path), fault, _REMEDY) from None
-    expected = shapes(width, rounds)
+    expected = shapes(document.width, document.rounds, heads(domain))
     if {name: tensor.shape for name, tensor in tensors.items()} != expected:
         raise InputError(str(path), "does not have the weights that its JSON describes", _REMEDY)
     if not all(np.isfinite(tensor).all() for tensor in tensors.values()):
         raise InputError(str(path), "has weights that are not finite", _REMEDY)
-    return Weights(limits, {name: tensor.astype(np.float32) for name, tensor in tensors.items()})
+    tensors = {name: tensor.astype(np.float32) for name, tensor in tensors.items()}
+    return Weights(limits, tensors, domain)

@@ -1,9 +1,12 @@
 """The relational network: messages between all symbols, then a score for every action."""
 
+from collections.abc import Mapping
+
 import torch
 from torch import Tensor, nn
 
 from guided_lgp.policy.relational.encoding import EDGE_FEATURES, NODE_FEATURES
+from guided_lgp.policy.relational.heads import Head
 
 
 class RelationalNetwork(nn.Module):
@@ -13,7 +16,7 @@ class RelationalNetwork(nn.Module):
     others there are that have nothing to say.
     """
 
-    def __init__(self, width: int, rounds: int) -> None:
+    def __init__(self, width: int, rounds: int, heads: Mapping[str, Head]) -> None:
         super().__init__()
         nodes, edges = len(NODE_FEATURES), len(EDGE_FEATURES)
         self.embed = nn.Linear(nodes, width)
@@ -23,10 +26,11 @@ class RelationalNetwork(nn.Module):
         self.hidden = nn.ModuleList(nn.Linear(2 * width, width) for _ in range(rounds))
         self.update = nn.ModuleList(nn.Linear(width, width) for _ in range(rounds))
         self.pool = nn.Linear(width, width)
-        self.grasp = nn.Sequential(nn.Linear(2 * width, width), nn.ReLU(), nn.Linear(width, 1))
-        self.place = nn.Sequential(
-            nn.Linear(3 * width + edges, width), nn.ReLU(), nn.Linear(width, 1)
-        )
+        self.heads = heads
+        for name, head in heads.items():
+            inputs = 3 * width + edges if head.holds else 2 * width
+            scores = nn.Sequential(nn.Linear(inputs, width), nn.ReLU(), nn.Linear(width, 1))
+            self.add_module(name, scores)
 
     def forward(self, nodes: Tensor, edges: Tensor, held: Tensor) -> Tensor:
         """Scores of all actions of all grippers.
@@ -37,7 +41,7 @@ class RelationalNetwork(nn.Module):
             held: (B,) number of the table that the gripper holds, or -1.
 
         Returns:
-            (B, 2, T): of grasping each table, and of placing what is held on each.
+            (B, heads, T): of every instruction on each table as its target.
         """
         state = torch.relu(self.embed(nodes))
         for receive, send, edge, hidden, update in zip(
@@ -49,6 +53,10 @@ class RelationalNetwork(nn.Module):
         whole = torch.relu(self.pool(state)).max(dim=1, keepdim=True).values.expand_as(state)
         rows = torch.arange(len(held))
         in_hand = state[rows, held][:, None].expand_as(state)
-        grasp = self.grasp(torch.cat([state, whole], dim=-1))
-        place = self.place(torch.cat([state, whole, in_hand, edges[rows, held]], dim=-1))
-        return torch.stack([grasp, place], dim=1)[..., 0]
+        free = torch.cat([state, whole], dim=-1)
+        full = torch.cat([state, whole, in_hand, edges[rows, held]], dim=-1)
+        scores = [
+            self.get_submodule(name)(full if head.holds else free)
+            for name, head in self.heads.items()
+        ]
+        return torch.stack(scores, dim=1)[..., 0]

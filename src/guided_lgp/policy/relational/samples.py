@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guided_lgp.errors import InputError
+from guided_lgp.logic import Domain
 from guided_lgp.policy.arrays import BoolArray, IntArray
 from guided_lgp.policy.paper.dataset import Dataset
 from guided_lgp.policy.paper.encoding import Encoding
@@ -17,11 +18,13 @@ from guided_lgp.policy.relational.encoding import (
     NODE_FEATURES,
     READY,
     SETTLED,
-    SIDES,
     Range,
     Situations,
     graphs,
+    is_held,
+    sides,
 )
+from guided_lgp.policy.relational.heads import heads
 
 
 @dataclass(frozen=True)
@@ -34,12 +37,14 @@ class Examples:
     the rest of a shortest sequence."""
     configuration: NDArray[np.int32]
     """(N,) index of the configuration."""
+    domain: Domain
 
     def __len__(self) -> int:
         return len(self.configuration)
 
     def __getitem__(self, rows: IntArray | BoolArray) -> "Examples":
-        return Examples(self.situations[rows], self.right[rows], self.configuration[rows])
+        right, configuration = self.right[rows], self.configuration[rows]
+        return Examples(self.situations[rows], right, configuration, self.domain)
 
 
 def examples(dataset: Dataset) -> Examples:
@@ -55,7 +60,7 @@ def examples(dataset: Dataset) -> Examples:
         InputError: the samples are encoded otherwise than the paper's.
     """
     encoding = dataset.encoding
-    if encoding != Encoding():
+    if encoding != Encoding(domain=encoding.domain, slots=encoding.slots, goals=encoding.goals):
         raise InputError("data set", "is encoded otherwise", "the samples of the paper's networks")
     supports = dataset.supports[dataset.sample_state].astype(np.int64)
     goals = _goals(dataset)[dataset.sample_goals]
@@ -67,23 +72,41 @@ def examples(dataset: Dataset) -> Examples:
     keys = np.column_stack([configuration, dataset.supports[state], goals])
     _, first, group = np.unique(keys, axis=0, return_index=True, return_inverse=True)
 
-    instruction, gripper, box, table = dataset.actions[state].T.astype(np.int64)
-    tables = encoding.supports
-    surfaces = tables - encoding.bodies
-    target = np.where(instruction == 0, surfaces + box, table)
-    right = np.zeros((len(first), len(SIDES), tables), dtype=bool)
-    right[group, gripper, target] = True
+    actor, target = _actor_and_target(dataset)
+    right = np.zeros((len(first), encoding.holders, encoding.supports), dtype=bool)
+    right[group, actor[state], target[state]] = True
     positions = dataset.states[state[first]].reshape(len(first), -1, 3)[:, encoding.holders :]
     boxes, fixed = np.split(positions, [encoding.bodies], axis=1)
     situations = Situations(
         np.concatenate([fixed, boxes], axis=1),
         dataset.supports[state[first]].astype(np.int64),
         goals[first],
+        encoding.holders,
     )
     for preference in (supports_first(situations), own_side(situations)):
         preferred = right & preference
         right = np.where(preferred.any(axis=(1, 2), keepdims=True), preferred, right)
-    return Examples(situations, right, configuration[first])
+    return Examples(situations, right, configuration[first], encoding.signature.domain)
+
+
+def _actor_and_target(dataset: Dataset) -> tuple[IntArray, IntArray]:
+    """(M,) each the acting gripper and the node that is the target, of every action."""
+    encoding, signature = dataset.encoding, dataset.encoding.signature
+    actor, target = np.zeros((2, len(dataset.actions)), dtype=np.int64)
+    for name, head in heads(signature.domain).items():
+        rows = dataset.actions[:, 0] == signature.instructions.index(name)
+        first = signature.decisions.index(head.instruction.parameters[0].name)
+        actor[rows] = dataset.actions[rows, first]
+        classes = dataset.actions[rows, signature.decisions.index(head.target.name)]
+        target[rows] = _nodes(encoding, head.target.name)[classes]
+    return actor, target
+
+
+def _nodes(encoding: Encoding, parameter: str) -> IntArray:
+    """The number of the node of every class of a parameter."""
+    kinds = np.array([k for k in encoding.signature.supports for _ in range(encoding.count([k]))])
+    own = encoding.signature.kinds_of[parameter]
+    return np.concatenate([np.flatnonzero(kinds == kind) for kind in own])
 
 
 def supports_first(situations: Situations) -> BoolArray:
@@ -104,8 +127,9 @@ def _goals(dataset: Dataset) -> IntArray:
     """(objectives, boxes) the encoded objectives as what each box shall stand on."""
     encoding = dataset.encoding
     codes = dataset.goals.reshape(len(dataset.goals), encoding.goals, encoding.goal_size)
-    kind, box, table = np.split(codes, [2, 2 + encoding.bodies], axis=2)
-    held = kind.argmax(axis=2) == encoding.signature.goal_kinds.index("held")
+    domain, kinds = encoding.signature.domain, encoding.signature.goal_kinds
+    kind, box, table = np.split(codes, [len(kinds), len(kinds) + encoding.bodies], axis=2)
+    held = np.array([is_held(domain, name) for name in kinds])[kind.argmax(axis=2)]
     places = np.where(held, GOAL_HELD, table.argmax(axis=2))
     goals = np.full((len(codes), encoding.bodies), NO_GOAL)
     np.put_along_axis(goals, box.argmax(axis=2), places, axis=1)
@@ -115,5 +139,5 @@ def _goals(dataset: Dataset) -> IntArray:
 def own_side(situations: Situations) -> BoolArray:
     """(B, G, T) whether an action is not a grasp of a box on the other side of the middle."""
     held = graphs(situations, Range.of(situations)).held[..., None]
-    towards = situations.positions[:, None, :, 1] * np.array(SIDES, dtype=np.float32)[:, None]
+    towards = situations.positions[:, None, :, 1] * sides(situations.grippers)[:, None]
     return (held >= 0) | (towards > 0)

@@ -12,7 +12,8 @@ from torch.optim.lr_scheduler import CosineAnnealingLR
 
 from guided_lgp.params import TrainRelational
 from guided_lgp.policy.arrays import IntArray
-from guided_lgp.policy.relational.encoding import Range, applicable, graphs
+from guided_lgp.policy.relational.encoding import Range, graphs
+from guided_lgp.policy.relational.heads import heads
 from guided_lgp.policy.relational.model import Weights
 from guided_lgp.policy.relational.network import RelationalNetwork
 from guided_lgp.policy.relational.samples import Examples
@@ -25,7 +26,7 @@ from guided_lgp.policy.training import (
 )
 
 Batch = tuple[Tensor, Tensor, Tensor, Tensor, Tensor]
-"""Nodes, edges, held, applicable and right actions."""
+"""Nodes, edges, held, applicable and right actions; the applicable ones by head, too."""
 
 
 class Batches:
@@ -35,13 +36,10 @@ class Batches:
         self, examples: Examples, limits: Range, size: int, rng: np.random.Generator | None = None
     ) -> None:
         inputs = graphs(examples.situations, limits)
-        arrays = (
-            inputs.nodes,
-            inputs.edges,
-            inputs.held,
-            applicable(examples.situations, inputs),
-            examples.right,
-        )
+        allowed = [
+            head.applicable(examples.situations, inputs) for head in heads(examples.domain).values()
+        ]
+        arrays = (inputs.nodes, inputs.edges, inputs.held, np.stack(allowed, 1), examples.right)
         self._tensors = [torch.from_numpy(array) for array in arrays]
         self._count, self._size, self._rng = len(examples), size, rng
 
@@ -91,9 +89,14 @@ class RelationalModule(PolicyModule):
 def log_probabilities(network: RelationalNetwork, batch: Batch) -> Tensor:
     """(B, G · T) log-probability of every action; minus infinity where it is not applicable."""
     nodes, edges, held, allowed, _ = batch
-    scores = network(nodes.flatten(0, 1), edges.flatten(0, 1), held.flatten())
-    chosen = torch.where(held.flatten()[:, None] < 0, scores[:, 0], scores[:, 1])
-    masked = chosen.view_as(allowed).masked_fill(~allowed, -torch.inf)
+    count, grippers = held.shape
+    per_gripper = edges[:, None].expand(-1, grippers, -1, -1, -1)
+    scores = network(nodes.flatten(0, 1), per_gripper.flatten(0, 1), held.flatten())
+    by_head = scores.view(count, grippers, *scores.shape[1:]).transpose(1, 2)
+    chosen = by_head[:, 0]  # no two instructions are applicable to one target at a time
+    for head in range(1, allowed.shape[1]):
+        chosen = torch.where(allowed[:, head], by_head[:, head], chosen)
+    masked = chosen.masked_fill(~allowed.any(1), -torch.inf)
     return torch.log_softmax(masked.flatten(1), dim=1)
 
 
@@ -127,13 +130,13 @@ def fit(
     held_out = Batches(validation, limits, settings.batch)
     with one_quiet_thread(), torch.random.fork_rng(devices=[]):
         torch.manual_seed(int(weights.generate_state(1)[0]))
-        network = RelationalNetwork(settings.width, settings.rounds)
+        network = RelationalNetwork(settings.width, settings.rounds, heads(training.domain))
         module = RelationalModule(network, settings)
         best_epoch = train(module, batches, held_out, settings.epochs, settings.patience)
-        confusion = _confusion(network, held_out)
+        confusion = _confusion(network, held_out, len(network.heads))
     tensors = {name: part.numpy().copy() for name, part in network.state_dict().items()}
     return Fit(
-        weights=Weights(limits, tensors),
+        weights=Weights(limits, tensors, training.domain),
         best_epoch=best_epoch,
         curves=module.curves,
         confusion=confusion,
@@ -141,15 +144,14 @@ def fit(
 
 
 @torch.no_grad()
-def _confusion(network: RelationalNetwork, batches: Batches) -> IntArray:
-    count = 2
+def _confusion(network: RelationalNetwork, batches: Batches, count: int) -> IntArray:
     confusion = np.zeros((count, count), dtype=np.int64)
     for batch in batches:
-        log_p, held, right = log_probabilities(network, batch), batch[2], batch[-1]
-        place = (held >= 0)[..., None].expand_as(right).flatten(1).long()
+        log_p, allowed, right = log_probabilities(network, batch), batch[3], batch[4]
+        head = allowed.int().argmax(1).flatten(1)
         truth = log_p.masked_fill(~right.flatten(1), -torch.inf).argmax(1, keepdim=True)
         chosen = log_p.argmax(1, keepdim=True)
         confusion += confusion_matrix(
-            place.gather(1, truth).flatten(), place.gather(1, chosen).flatten(), count
+            head.gather(1, truth).flatten(), head.gather(1, chosen).flatten(), count
         )
     return confusion
