@@ -10,7 +10,7 @@ from guided_lgp.bounds.verify import verify_keyframes
 from guided_lgp.logic import Skeleton, applicable_actions, parse_skeleton, progress, successor
 from guided_lgp.poses import tilt
 from guided_lgp.robots import load_robot
-from guided_lgp.scene import Box, PlacedRobot, Scene, Table, generate, pr2
+from guided_lgp.scene import Box, PlacedRobot, Scene, Table, generate
 from guided_lgp.scene.setups import SETUPS
 from guided_lgp.scene.world import World
 
@@ -19,6 +19,7 @@ TABLES = (
     Table(name="tab1", position=(0.54, 0.33, 0.60), half_extents=(0.17, 0.20)),
     Table(name="tab2", position=(0.54, -0.33, 0.60), half_extents=(0.17, 0.20)),
 )
+PR2 = load_robot("pr2")
 SCENE = Scene(
     tables=TABLES,
     boxes=(
@@ -96,7 +97,7 @@ def test_random_verdicts_are_true_in_every_setup() -> None:
 def test_the_acting_arm_retreats_to_its_side(bound: CoarseBound) -> None:
     result = bound.solve(parse_skeleton("(grasp pr2L red) (place pr2L red tab1)"))
     for keyframe in result.after_action:
-        assert np.array_equal(keyframe.q, pr2.HOME_CONFIGURATION)
+        assert np.array_equal(keyframe.q, PR2.home)
     assert result.after_action[0].boxes["red"][2] > 0.9  # at the hand, not on the table
     assert result.after_action[1].boxes["red"] == pytest.approx(result.at_switch[1].boxes["red"])
 
@@ -106,7 +107,7 @@ def test_an_arm_whose_box_carries_another_stays_level(bound: CoarseBound) -> Non
         parse_skeleton("(grasp pr2L green) (place pr2L green red) (grasp pr2L red)")
     )
     contact, lifted_away = lifted.at_switch[-1], lifted.after_action[-1]
-    assert not np.allclose(lifted_away.q[:7], pr2.HOME["pr2L"])
+    assert not np.allclose(lifted_away.q[:7], PR2.arms["pr2L"].home)
     for box in ("red", "green"):
         rise = lifted_away.boxes[box] - contact.boxes[box]
         assert rise == pytest.approx([0, 0, 0.08, 0, 0, 0, 0], abs=1e-9)
@@ -114,10 +115,10 @@ def test_an_arm_whose_box_carries_another_stays_level(bound: CoarseBound) -> Non
     text = "(grasp pr2L red) (grasp pr2R blue) (place pr2R blue red) (grasp pr2R blue)"
     presented = bound.solve(parse_skeleton(text))
     _, before, carrying, emptied = presented.after_action
-    assert np.array_equal(before.q, pr2.HOME_CONFIGURATION)
+    assert np.array_equal(before.q, PR2.home)
     assert np.array_equal(carrying.q[:7], presented.at_switch[2].q[:7])
     assert float(tilt(carrying.boxes["red"])) == pytest.approx(0, abs=1e-6)
-    assert np.array_equal(emptied.q, pr2.HOME_CONFIGURATION)
+    assert np.array_equal(emptied.q, PR2.home)
 
 
 def test_a_failure_names_constraint_and_action(bound: CoarseBound) -> None:

@@ -21,7 +21,7 @@ from guided_lgp.bounds.terms import kernel_table
 from guided_lgp.errors import InputError
 from guided_lgp.logic import parse_skeleton
 from guided_lgp.robots import load_robot
-from guided_lgp.scene import generate, pr2
+from guided_lgp.scene import generate
 
 
 def _compiled() -> Compiled:
@@ -116,8 +116,7 @@ assert load_library(load_robot("pr2"))
 def test_a_cache_folder_that_cannot_be_written_is_named(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    description = pr2.urdf_path()
-    monkeypatch.setattr(pr2, "urdf_path", lambda: description)
+    assert load_robot("pr2").urdf.is_file()  # cached before its folder is taken away
     (tmp_path / "file").touch()
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
     with pytest.raises(InputError, match=r"guided-lgp: .*XDG_CACHE_HOME"):
@@ -127,8 +126,7 @@ def test_a_cache_folder_that_cannot_be_written_is_named(
 def test_without_a_compiler_the_interpreter_takes_over_and_says_so_once(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    description = pr2.urdf_path()
-    monkeypatch.setattr(pr2, "urdf_path", lambda: description)
+    assert load_robot("pr2").urdf.is_file()  # cached before its folder is taken away
     monkeypatch.setattr(compiled, "find_spec", lambda name: None)
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))

@@ -9,7 +9,7 @@ from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.poses import apply, rotation_matrix
 from guided_lgp.poses import inverse as inverse_pose
 from guided_lgp.robots import load_robot
-from guided_lgp.scene import GRIPPERS, Box, PlacedRobot, Scene, Table, pr2
+from guided_lgp.scene import Box, PlacedRobot, Scene, Table
 
 TORSO = 0.21
 SCENE = Scene(
@@ -19,7 +19,8 @@ SCENE = Scene(
 )
 
 
-(CHAIN,) = kinematics_of(load_robot("pr2")).chains
+PR2 = load_robot("pr2")
+(CHAIN,) = kinematics_of(PR2).chains
 LENGTHS = human_like(CHAIN)
 
 
@@ -29,20 +30,20 @@ def _forward() -> ca.Function:
     return ca.Function("forward", [q, side, torso], [arm.position, arm.rotation, arm.spheres])
 
 
-@pytest.mark.parametrize("gripper", GRIPPERS)
+@pytest.mark.parametrize("gripper", PR2.grippers)
 def test_forward_kinematics_agree_with_pinocchio(gripper: str) -> None:
     rng, forward = np.random.default_rng(0), _forward()
     side = 1.0 if gripper == "pr2L" else -1.0
     q = np.zeros(14)
-    for joints in rng.uniform(*pr2.JOINT_LIMITS[:7].T, size=(50, 7)):
-        q[pr2.arm_slice(gripper)] = joints if side > 0 else pr2.MIRROR * joints
+    for joints in rng.uniform(*PR2.arms["pr2L"].limits.T, size=(50, 7)):
+        q[PR2.arms[gripper].slice] = PR2.arms[gripper].signs * joints
         position, rotation, spheres = (np.array(part) for part in forward(joints, side, TORSO))
-        expected = pr2.tool_pose(SCENE, q, gripper)
+        expected = SCENE.robot.tool_pose(q, gripper)
         assert np.abs(position.ravel() - expected[:3]).max() < 1e-9
         assert np.abs(rotation - rotation_matrix(expected[3:])).max() < 1e-9
         for sphere, centre in zip(CHAIN.spheres, spheres.T, strict=True):
-            link = pr2.SIDE[gripper] + sphere.link[1:]
-            local = apply(inverse_pose(pr2.link_pose(SCENE, q, link)), centre)
+            link = gripper[-1].lower() + sphere.link[1:]
+            local = apply(inverse_pose(SCENE.robot.link_pose(q, link)), centre)
             assert np.abs(local - np.array(sphere.centre) * (1, side, 1)).max() < 1e-9
 
 
@@ -55,7 +56,7 @@ def test_closed_form_inverse_kinematics_invert_the_forward_ones() -> None:
         [position, rotation, pan, branch, side],
         [inverse(LENGTHS, position, rotation, pan, branch, side, TORSO)],
     )
-    for joints in rng.uniform(*pr2.JOINT_LIMITS[:7].T, size=(100, 7)):
+    for joints in rng.uniform(*PR2.arms["pr2L"].limits.T, size=(100, 7)):
         for hand in (1.0, -1.0):
             target = [np.array(part) for part in forward(joints, hand, TORSO)[:2]]
             found = []

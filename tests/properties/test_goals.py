@@ -24,9 +24,11 @@ from guided_lgp.logic import (
     satisfied,
     validate_objective,
 )
-from guided_lgp.scene import GRIPPERS, Scene
+from guided_lgp.robots import load_robot
+from guided_lgp.scene import Scene
 
 DOMAIN = load_domain()
+GRIPPERS = load_robot("pr2").grippers
 BOXES, TABLES = ("red", "green", "blue"), ("tab1", "tab2")
 words = st.one_of(
     st.sampled_from((*BOXES, *TABLES, *GRIPPERS, "held", "on", "place", "shelf", *UNICODE_NAMES)),

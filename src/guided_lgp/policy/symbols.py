@@ -6,14 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guided_lgp.logic import State, Symbols
-from guided_lgp.scene import GRIPPERS
 
 
 def declared_symbols(state: State, positions: Mapping[str, NDArray[np.float64]]) -> Symbols:
-    """The symbols of a state, in the order in which a search hands over their positions."""
+    """The symbols of a state, from the positions: of grippers, then boxes, then surfaces."""
     boxes = {name for name, _ in state.support + state.held}
+    names = tuple(positions)
+    first = min(names.index(box) for box in boxes)
     return state.domain.symbols(
-        gripper=GRIPPERS,
-        box=tuple(name for name in positions if name in boxes),
-        table=tuple(name for name in positions if name not in {*GRIPPERS, *boxes}),
+        gripper=names[:first],
+        box=tuple(name for name in names if name in boxes),
+        table=tuple(name for name in names[first:] if name not in boxes),
     )

@@ -19,7 +19,7 @@ from guided_lgp.logic import (
     progress,
     two_goal_objectives,
 )
-from guided_lgp.scene import GRIPPERS, Scene
+from guided_lgp.scene import Scene
 
 BOX, HELD_BOX = "box", "held box"
 _BETWEEN = ("collision", "support")
@@ -187,7 +187,7 @@ def constraint_kind(constraint: str, scene: Scene) -> str:
     ``reach``.
     """
     kinds = {table.name: "table" for table in scene.tables} | {b.name: "box" for b in scene.boxes}
-    kinds |= dict.fromkeys(GRIPPERS, "robot")
+    kinds |= dict.fromkeys(scene.symbols.grippers, "robot")
     words = [word for word in constraint.split() if word != "of"]
     bodies = [kinds.get(word, "robot" if "_" in word else "") for word in words]
     kind = " ".join(word for word, body in zip(words, bodies, strict=True) if not body)

@@ -1,10 +1,9 @@
 """Scenes, their generation and their PyBullet world."""
 
 from guided_lgp.scene.generate import GeneratedScenes, generate, load_scenes
-from guided_lgp.scene.model import GRIPPERS, Box, PlacedRobot, Scene, Table, load_scene, parse_scene
+from guided_lgp.scene.model import Box, PlacedRobot, Scene, Table, load_scene, parse_scene
 
 __all__ = [
-    "GRIPPERS",
     "Box",
     "GeneratedScenes",
     "PlacedRobot",

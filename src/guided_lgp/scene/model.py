@@ -25,8 +25,6 @@ from guided_lgp.logic import State, Symbols
 from guided_lgp.poses import Array, compose, pose
 from guided_lgp.robots import Robot, load_robot
 
-GRIPPERS = ("pr2L", "pr2R")
-
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]*$", max_length=32)]
 # strict: neither true nor "0.4" is a number
 Coordinate = Annotated[float, Field(strict=True, ge=-10, le=10, allow_inf_nan=False)]
@@ -81,11 +79,6 @@ class PlacedRobot(BaseModel):
         """Values (rad, or m) of the joints that stay as they are, by the joint's name."""
         joints = self.description.fixed_joints
         return {fixed.joint: self.__pydantic_extra__[name] for name, fixed in joints.items()}
-
-    @property
-    def torso(self) -> float:
-        """Height (m) of the PR2's torso."""
-        return self.__pydantic_extra__["torso"]
 
     @property
     def columns(self) -> tuple[Column, ...]:

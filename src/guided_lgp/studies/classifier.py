@@ -19,7 +19,6 @@ from guided_lgp.policy.declaration import TrainedPolicy
 from guided_lgp.policy.paper.inference import chain_log_probabilities
 from guided_lgp.policy.paper.model import Layers
 from guided_lgp.policy.relational.encoding import sides
-from guided_lgp.scene import GRIPPERS
 
 FEATURES = (
     "is a grasp",
@@ -53,7 +52,7 @@ def features(
         positions: world position (3,) in m of every symbol.
         action: the action.
     """
-    side = float(sides(2)[GRIPPERS.index(action.gripper)])
+    side = float(sides(2)[list(positions).index(action.gripper)])
     target = action.table or action.box
     standing = state.standing_on(target)
     x, y, z = positions[target].tolist()

@@ -8,7 +8,7 @@ import numpy as np
 from guided_lgp.bounds.results import Array
 from guided_lgp.robots import Arm
 from guided_lgp.scene import Box
-from guided_lgp.scene.pr2 import grasp_axis
+from guided_lgp.scene.model import grasp_axis
 
 PALM_GAP = 0.002
 """Distance (m) of the palm's front from the box, at least."""

@@ -8,7 +8,8 @@ import numpy as np
 
 from guided_lgp.bounds.results import Array
 from guided_lgp.poses import inverse, yaw_of
-from guided_lgp.scene import Scene, pr2
+from guided_lgp.scene import Scene
+from guided_lgp.scene.model import grasp_axis
 from guided_lgp.scene.world import TABLE_THICKNESS
 
 
@@ -85,6 +86,6 @@ class SceneGeometry:
     def grasp_side(self, name: str) -> tuple[float, float, float]:
         """How the fingers close on a box: turn of its length against x, half length, width."""
         hx, hy, hz = self.bodies[name].half
-        if pr2.grasp_axis((2 * hx, 2 * hy, 2 * hz)) == 1:
+        if grasp_axis((2 * hx, 2 * hy, 2 * hz)) == 1:
             return 0.0, hx, 2 * hy
         return np.pi / 2, hy, 2 * hx
