@@ -7,6 +7,7 @@ has one of them nearly (a wrist with an offset of a centimetre) is solved as if 
 Newton's method closes the gap; one that has none is solved by Newton's method from fixed starts.
 """
 
+from collections.abc import Mapping
 from functools import cache
 
 import numpy as np
@@ -128,21 +129,22 @@ class InverseKinematics:
         return np.asarray(q - np.where((q > high) & (q - _TURN >= low), _TURN, 0.0))
 
 
-@cache
-def inverse_kinematics(robot: Robot, gripper: str, fixed: tuple[float, ...]) -> InverseKinematics:
+def inverse_kinematics(robot: Robot, gripper: str, fixed: Mapping[str, float]) -> InverseKinematics:
     """The solver of a robot's arm, in the frame of its base link.
 
     Args:
         robot: whose arm it is.
         gripper: which one.
-        fixed: values (rad or m) of the joints that the scene sets, in the robot's order.
+        fixed: values (rad or m) of the joints that the scene sets, by name.
     """
+    return _solver(robot, gripper, tuple(sorted(fixed.items())))
+
+
+@cache
+def _solver(robot: Robot, gripper: str, fixed: tuple[tuple[str, float], ...]) -> InverseKinematics:
     arm = robot.arms[gripper]
-    joints = (joint.joint for joint in robot.fixed_joints.values())
-    values = dict(zip(joints, fixed, strict=True))
-    chain = read_chain(robot.urdf, robot.base_link, arm.tool_link, arm.joints, values)
-    tool = arm.tool_in_link
-    chain = chain.extended(rotation_matrix(tool[3:]), tool[:3])
+    chain = read_chain(robot.urdf, robot.base_link, arm.tool_link, arm.joints, dict(fixed))
+    chain = chain.extended(rotation_matrix(arm.tool_in_link[3:]), arm.tool_in_link[:3])
     return InverseKinematics(chain, arm.limits, arm.redundant, arm.home)
 
 

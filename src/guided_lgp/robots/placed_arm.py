@@ -1,7 +1,6 @@
 """An arm of a robot that stands in a scene: its kinematics in the world."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import cached_property
 from typing import Protocol
 
@@ -9,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guided_lgp.poses import Array, rotation_matrix
-from guided_lgp.robots.chain import read_chain
-from guided_lgp.robots.inverse import InverseKinematics
+from guided_lgp.robots.inverse import inverse_kinematics
 from guided_lgp.robots.offset_shoulder import OffsetShoulder
 from guided_lgp.robots.robot import Robot
 
@@ -141,12 +139,5 @@ def _solver(robot: Robot, gripper: str, fixed: Mapping[str, float]) -> tuple[Sol
         lift = 0.0 if measures.lifted_by is None else fixed[measures.lifted_by]
         solver = OffsetShoulder(measures, limits, arm.signs, lift)
         return solver, solver.shoulder, measures.reach
-    chain = read_chain(robot.urdf, robot.base_link, arm.tool_link, arm.joints, fixed)
-    tool = rotation_matrix(arm.tool_in_link[3:])
-    chain = replace(
-        chain,
-        rotation=chain.rotation @ tool,
-        position=chain.position + chain.rotation @ arm.tool_in_link[:3],
-    )
-    general = InverseKinematics(chain, arm.limits, arm.redundant, arm.home)
-    return general, chain.points[1], float(arm.lever_arms[1])
+    general = inverse_kinematics(robot, gripper, fixed)
+    return general, general.chain.points[1], float(arm.lever_arms[1])

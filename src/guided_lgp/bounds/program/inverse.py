@@ -88,7 +88,9 @@ class General:
     def __init__(self, robot: Robot, arm: ArmKinematics, fixed: tuple[float, ...]) -> None:
         self._arm = arm.arm
         self._low, self._high = arm.arm.limits.T
-        self._solver = inverse_kinematics(robot, arm.arm.gripper, fixed)
+        joints = (joint.joint for joint in robot.fixed_joints.values())
+        values = dict(zip(joints, fixed, strict=True))
+        self._solver = inverse_kinematics(robot, arm.arm.gripper, values)
         self._values = self._solver.redundancies(_VALUES)
 
     def __call__(
