@@ -8,7 +8,7 @@ from guided_lgp.errors import InputError
 from guided_lgp.scene.footprints import footprint, gap, inset
 from guided_lgp.scene.model import Box, Scene, Table, grasp_axis
 from guided_lgp.scene.reach import reachable_by_any
-from guided_lgp.scene.world import TABLE_THICKNESS, World
+from guided_lgp.scene.world import TABLE_THICKNESS, initial_poses, world_of
 
 FLOAT_TOLERANCE = 0.002
 """How far (m) the bottom of a box may be off its support's top."""
@@ -64,13 +64,13 @@ def _validate_tables(scene: Scene, where: str) -> None:
         apart = abs(one.position[2] - other.position[2]) >= TABLE_THICKNESS
         if not apart and gap(footprint(one), footprint(other)) < -OVERLAP_TOLERANCE:
             raise InputError(f"{where}: tables", f"{one.name} and {other.name} overlap")
-    with World(scene) as world:
-        for link in world.fixed_links:
-            for table in scene.tables:
-                depth = -world.distance(link, table.name, 0.0)
-                if depth > OVERLAP_TOLERANCE:
-                    fault = f"{table.name} is {depth:.3f} m inside the robot ({link})"
-                    raise InputError(f"{where}: tables", fault)
+    world = world_of(scene)
+    for link in world.fixed_links:
+        for table in scene.tables:
+            depth = -world.distance(link, table.name, 0.0)
+            if depth > OVERLAP_TOLERANCE:
+                fault = f"{table.name} is {depth:.3f} m inside the robot ({link})"
+                raise InputError(f"{where}: tables", fault)
 
 
 def _validate_box(scene: Scene, box: Box, where: str) -> None:
@@ -105,9 +105,10 @@ def _validate_box(scene: Scene, box: Box, where: str) -> None:
 
 
 def _validate_overlaps(scene: Scene, where: str) -> None:
-    with World(scene) as world:
-        supports = {frozenset((box.name, box.on)) for box in scene.boxes}
-        for overlap in world.penetrations(OVERLAP_TOLERANCE):
-            if overlap.bodies not in supports:
-                fault = f"{overlap.first} and {overlap.second} overlap by {overlap.depth:.3f} m"
-                raise InputError(f"{where}: boxes", fault)
+    world = world_of(scene)
+    world.set(scene.robot.description.home, initial_poses(scene))
+    supports = {frozenset((box.name, box.on)) for box in scene.boxes}
+    for overlap in world.penetrations(OVERLAP_TOLERANCE):
+        if overlap.bodies not in supports:
+            fault = f"{overlap.first} and {overlap.second} overlap by {overlap.depth:.3f} m"
+            raise InputError(f"{where}: boxes", fault)

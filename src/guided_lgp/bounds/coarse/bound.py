@@ -1,7 +1,6 @@
 """The coarse bound P_coarse of a skeleton (paper, eq. 3): starts, solver, verification."""
 
 import time
-import weakref
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -19,7 +18,7 @@ from guided_lgp.bounds.terms.term import UngraspableError
 from guided_lgp.bounds.verify import verify_keyframes
 from guided_lgp.logic import Skeleton, format_skeleton
 from guided_lgp.scene import Scene
-from guided_lgp.scene.world import World
+from guided_lgp.scene.world import world_of
 
 
 @dataclass(frozen=True)
@@ -47,8 +46,7 @@ class CoarseBound:
         self._starts = Starts(self._geometry, self._solver)
         self._decoder = Decoder(self._geometry)
         self._settings = Settings()
-        self._world = World(scene)
-        weakref.finalize(self, self._world.close)
+        self._world = world_of(scene)
 
     def solve(self, skeleton: Skeleton, prefix: CoarseResult | None = None) -> CoarseResult:
         """The verdict on a skeleton.

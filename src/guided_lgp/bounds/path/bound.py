@@ -14,7 +14,7 @@ from guided_lgp.bounds.path.task import FurthestFailure, Outcome, Stage, Task
 from guided_lgp.bounds.results import CoarseResult, Failure, PathResult
 from guided_lgp.bounds.verify import verify_path
 from guided_lgp.scene import Scene
-from guided_lgp.scene.world import World
+from guided_lgp.scene.world import world_of
 
 _ITERATIONS = 150
 """Samples of the sampling planner per motion."""
@@ -49,7 +49,7 @@ class PathBound:
             for gripper, arm in self._mover.robot.arms.items()
             for box in scene.boxes
         }
-        self._world = World(scene)
+        self._world = world_of(scene)
 
     def solve(self, coarse_result: CoarseResult) -> PathResult:
         """Find a verified motion.
