@@ -83,7 +83,9 @@ class Relational:
             scene.symbols.domain.goal_type(goal)
         actions = list(applicable_actions(scene.state, scene.symbols))
         positions = observe(scene, start(scene))
-        log_p = self._policy.log_probabilities(objective, scene.state, positions, actions)
+        log_p = self._policy.log_probabilities(
+            objective, scene.state, scene.symbols, positions, actions
+        )
         pairs = zip(actions, np.exp(log_p).tolist(), strict=True)
         return {str(action): probability for action, probability in pairs}
 

@@ -1,5 +1,6 @@
 """Plan one task: the Python interface behind ``guided-lgp plan``."""
 
+import logging
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,15 +11,19 @@ from guided_lgp.explanation import ObservedBounds, Obstacle
 from guided_lgp.logic import Goal, parse_objective, validate_objective
 from guided_lgp.params import PlanningParams, load_planning
 from guided_lgp.paths import MODELS
-from guided_lgp.policy.registry import POLICIES, load_policy
+from guided_lgp.policy.registry import POLICIES, load_policy, missing_instructions
 from guided_lgp.scene import Scene
 from guided_lgp.scene.validate import validate_scene
 from guided_lgp.search.planners import SEARCHES, check_policies
-from guided_lgp.search.policy import Policy
+from guided_lgp.search.policy import Policy, Uniform
 from guided_lgp.search.problem import Problem
 from guided_lgp.search.result import REASONS, Cause, SearchResult
 
 DEFAULT_PLANNER, DEFAULT_POLICY = "guided", "relational"
+_WITHOUT_POLICY = "best-first"
+"""The search where the policy cannot score all actions: complete, whatever guides it."""
+
+logger = logging.getLogger(__name__)
 
 _OUTCOMES: Mapping[Cause, str] = {
     "infeasible": "infeasible",
@@ -100,10 +105,17 @@ def plan(
     if max_nodes is not None:
         limits = limits.model_copy(update={"max_tree_size": max_nodes})
     bounds = ObservedBounds(SceneBounds(scene, params.bounds))
-    if not search.follows_policy:
-        followed = None
-    else:
+    followed = None
+    if search.follows_policy:
         followed = load_policy(policy, models) if isinstance(policy, str) else policy
+        if missing := missing_instructions(followed, scene.symbols.domain):
+            logger.warning(
+                "the policy has no head for %s of the domain %s: %s search without it",
+                ", ".join(missing),
+                scene.symbols.domain.name,
+                _WITHOUT_POLICY,
+            )
+            search, followed = SEARCHES[_WITHOUT_POLICY], Uniform()
     result = search.plan(Problem(scene, goals, limits, bounds, followed))
     return PlanningResult(
         **vars(result),

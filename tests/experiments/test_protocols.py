@@ -12,6 +12,7 @@ from guided_lgp.logic import (
     Action,
     Objective,
     State,
+    Symbols,
     format_objective,
     one_goal_objectives,
     parse_skeleton,
@@ -33,6 +34,7 @@ class Sensible:
         self,
         objective: Objective,
         state: State,
+        symbols: Symbols,
         positions: Mapping[str, Array],
         actions: Sequence[Action],
     ) -> Array:

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from guided_lgp.bounds.results import Array, CoarseResult, Failure, PathResult
-from guided_lgp.logic import Action, Objective, Skeleton, State
+from guided_lgp.logic import Action, Objective, Skeleton, State, Symbols
 from guided_lgp.scene.model import Box, Scene, Table
 from guided_lgp.search.observation import start
 
@@ -71,6 +71,7 @@ class Scorer:
         self,
         objective: Objective,
         state: State,
+        symbols: Symbols,
         positions: Mapping[str, Array],
         actions: Sequence[Action],
     ) -> Array:

@@ -60,7 +60,7 @@ def classifier() -> FeasibilityClassifier:
 def test_features_are_those_of_the_gripper_and_its_target(symbols: Symbols) -> None:
     def after(state: State, text: str) -> tuple[list[float], State]:
         action = next(a for a in applicable_actions(state, symbols) if str(a) == text)
-        return features(state, POSITIONS, action), successor(state, action)
+        return features(state, symbols, POSITIONS, action), successor(state, action)
 
     left, holding = after(STATE, "(grasp pr2L red)")
     assert left == pytest.approx([1, 0.5, 0.3, 0.65, 1, 0, 1, 0, 0, 1])
@@ -125,9 +125,9 @@ def test_order_changes_and_no_action_is_lost(
     objective = parse_objective(["(held red)"])
     far = POSITIONS | {"green": np.array([0.5, 400.0, 0.65])}
     scores = FeasibilityAware(Uniform(), classifier).log_probabilities(
-        objective, STATE, far, actions
+        objective, STATE, symbols, far, actions
     )
-    uniform = Uniform().log_probabilities(objective, STATE, far, actions)
+    uniform = Uniform().log_probabilities(objective, STATE, symbols, far, actions)
     assert scores.shape == uniform.shape == (6,)
     assert np.isfinite(scores).all()
     assert (scores <= uniform).all()

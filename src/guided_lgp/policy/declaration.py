@@ -1,6 +1,6 @@
 """What a policy says about itself, once: :mod:`guided_lgp.policy.registry` finds it."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
@@ -9,16 +9,22 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from guided_lgp.logic import Action, Objective, State
+    from guided_lgp.logic import Action, Objective, State, Symbols
 
 
 class TrainedPolicy(Protocol):
     """A policy as a search asks it; see :class:`guided_lgp.search.policy.Policy`."""
 
+    @property
+    def instructions(self) -> "Collection[str]":
+        """The instructions that it can score."""
+        ...
+
     def log_probabilities(
         self,
         objective: "Objective",
         state: "State",
+        symbols: "Symbols",
         positions: "Mapping[str, NDArray[np.float64]]",
         actions: "Sequence[Action]",
     ) -> "NDArray[np.float64]":

@@ -7,11 +7,15 @@ from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
 from pkgutil import iter_modules
+from typing import TYPE_CHECKING
 
 from guided_lgp import policy
 from guided_lgp.errors import InputError
 from guided_lgp.paths import MODELS
 from guided_lgp.policy.declaration import PolicyDeclaration, TrainedPolicy
+
+if TYPE_CHECKING:
+    from guided_lgp.logic import Domain
 
 
 def _declared() -> Mapping[str, PolicyDeclaration]:
@@ -23,6 +27,13 @@ def _declared() -> Mapping[str, PolicyDeclaration]:
 
 POLICIES = _declared()
 """Every policy by its name, in the order of tables and legends."""
+
+
+def missing_instructions(policy: object, domain: "Domain") -> tuple[str, ...]:
+    """The instructions of a domain that a policy cannot score; one that does not say scores all."""
+    every = tuple(instruction.name for instruction in domain.instructions)
+    known = getattr(policy, "instructions", every)
+    return tuple(name for name in every if name not in known)
 
 
 def load_policy(name: str, directory: Path = MODELS) -> TrainedPolicy:

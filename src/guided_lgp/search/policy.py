@@ -6,7 +6,7 @@ from typing import Protocol
 import numpy as np
 
 from guided_lgp.bounds.results import Array
-from guided_lgp.logic import Action, Objective, State
+from guided_lgp.logic import Action, Objective, State, Symbols
 
 
 class Policy(Protocol):
@@ -16,6 +16,7 @@ class Policy(Protocol):
         self,
         objective: Objective,
         state: State,
+        symbols: Symbols,
         positions: Mapping[str, Array],
         actions: Sequence[Action],
     ) -> Array:
@@ -23,9 +24,10 @@ class Policy(Protocol):
 
         Args:
             objective: the goals to reach, as the search encodes them (adapted or not).
-            state: the symbolic state, for the choice of slots.
-            positions: world position (3,) in m of every symbol, as declared: the order of the boxes
-                and of the surfaces decides about the slots of a policy that has slots.
+            state: the symbolic state.
+            symbols: all symbols of the problem, as declared: their order decides about the slots of
+                a policy that has slots.
+            positions: world position (3,) in m of every symbol.
             actions: the applicable children, at least one.
 
         Returns:
@@ -41,6 +43,7 @@ class Uniform:
         self,
         objective: Objective,
         state: State,
+        symbols: Symbols,
         positions: Mapping[str, Array],
         actions: Sequence[Action],
     ) -> Array:

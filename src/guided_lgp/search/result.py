@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from guided_lgp.bounds.results import Array, CoarseResult, Failure, PathResult
-from guided_lgp.logic import Action, Objective, Skeleton, State, format_skeleton
+from guided_lgp.logic import Action, Objective, Skeleton, State, Symbols, format_skeleton
 from guided_lgp.search.problem import Problem
 
 Cause = Literal["infeasible", "max_depth"]
@@ -150,13 +150,14 @@ class Run:
         self,
         objective: Objective,
         state: State,
+        symbols: Symbols,
         positions: Mapping[str, Array],
         actions: Sequence[Action],
     ) -> Array:
         """The policy's scores of the actions; see :class:`~guided_lgp.search.policy.Policy`."""
         assert self._policy is not None
         start = time.perf_counter()
-        scores = self._policy.log_probabilities(objective, state, positions, actions)
+        scores = self._policy.log_probabilities(objective, state, symbols, positions, actions)
         elapsed = time.perf_counter() - start
         self._policy_s += elapsed
         self._waited += elapsed

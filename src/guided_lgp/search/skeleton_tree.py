@@ -86,7 +86,7 @@ class SkeletonTree:
         goals = unsatisfied(node.state, problem.objective) if problem.adapt else problem.objective
         positions = observe(problem.scene, configuration)
         scores: list[float] = self.run.log_probabilities(
-            goals, node.state, positions, actions
+            goals, node.state, problem.scene.symbols, positions, actions
         ).tolist()
         return scores
 

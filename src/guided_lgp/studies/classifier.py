@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from guided_lgp.errors import InputError
-from guided_lgp.logic import Action, Objective, State
+from guided_lgp.logic import Action, Objective, State, Symbols
 from guided_lgp.params import Network
 from guided_lgp.policy.arrays import FloatArray
-from guided_lgp.policy.declaration import TrainedPolicy
 from guided_lgp.policy.paper.inference import chain_log_probabilities
 from guided_lgp.policy.paper.model import Layers
 from guided_lgp.policy.relational.encoding import sides
+from guided_lgp.search.policy import Policy
 
 FEATURES = (
     "is a grasp",
@@ -43,16 +43,17 @@ _LEAST_DEVIATION = 1e-3  # less is no information, and scaling it up would be no
 
 
 def features(
-    state: State, positions: Mapping[str, NDArray[np.float64]], action: Action
+    state: State, symbols: Symbols, positions: Mapping[str, NDArray[np.float64]], action: Action
 ) -> list[float]:
     """:data:`FEATURES` of one action.
 
     Args:
         state: a symbolic state in which the action is applicable.
+        symbols: of the problem.
         positions: world position (3,) in m of every symbol.
         action: the action.
     """
-    side = float(sides(2)[list(positions).index(action.gripper)])
+    side = float(sides(len(symbols.grippers))[symbols.grippers.index(action.symbols[0])])
     target = action.table or action.box
     standing = state.standing_on(target)
     x, y, z = positions[target].tolist()
@@ -108,7 +109,7 @@ class FeasibilityAware:
     Every action keeps a finite score; none is excluded.
     """
 
-    def __init__(self, policy: TrainedPolicy, classifier: FeasibilityClassifier) -> None:
+    def __init__(self, policy: Policy, classifier: FeasibilityClassifier) -> None:
         self._policy = policy
         self._classifier = classifier
 
@@ -116,13 +117,15 @@ class FeasibilityAware:
         self,
         objective: Objective,
         state: State,
+        symbols: Symbols,
         positions: Mapping[str, NDArray[np.float64]],
         actions: Sequence[Action],
     ) -> NDArray[np.float64]:
         """Score applicable actions; see :class:`guided_lgp.search.policy.Policy`."""
-        inputs = [features(state, positions, action) for action in actions]
+        inputs = [features(state, symbols, positions, action) for action in actions]
         feasible = self._classifier.log_probabilities(np.array(inputs, dtype=np.float32))
-        return self._policy.log_probabilities(objective, state, positions, actions) + feasible
+        log_p = self._policy.log_probabilities(objective, state, symbols, positions, actions)
+        return log_p + feasible
 
 
 def train_classifier(

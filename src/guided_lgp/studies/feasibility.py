@@ -24,6 +24,7 @@ from guided_lgp.paths import SCENES, SEQUENCES, TRAINED
 from guided_lgp.policy.registry import POLICIES, load_policy
 from guided_lgp.scene import Scene, load_scenes
 from guided_lgp.search.observation import observe, start
+from guided_lgp.search.policy import Policy
 from guided_lgp.search.problem import Problem
 from guided_lgp.studies.cases import CLASSIFIER, OUTCOMES, RESULTS, load_study
 from guided_lgp.studies.classifier import (
@@ -154,7 +155,7 @@ def _inputs(scene: Scene, rows: Sequence[Row]) -> list[list[float]]:
     for row in rows:
         *prefix, action = parse_skeleton(row["skeleton"])
         state = progress(scene.state, prefix)
-        inputs.append(features(state, positions[tuple(prefix)], action))
+        inputs.append(features(state, scene.symbols, positions[tuple(prefix)], action))
     return inputs
 
 
@@ -164,7 +165,7 @@ def evaluate(task: _Task) -> list[Row]:
     rows = []
     for name in POLICIES:
         policy = load_policy(name, task.models)
-        scorers = (policy, FeasibilityAware(policy, task.classifier))
+        scorers: tuple[Policy, Policy] = (policy, FeasibilityAware(policy, task.classifier))
         for classified, scorer in zip(CLASSIFIER, scorers, strict=True):
             for search in SEARCHES:
                 for objective in problems(task.scene):

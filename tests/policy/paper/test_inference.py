@@ -13,7 +13,15 @@ from synthetic import make_scene, positions_along
 
 from guided_lgp.bounds.results import Array
 from guided_lgp.errors import InputError
-from guided_lgp.logic import Action, Objective, State, parse_objective, parse_skeleton, progress
+from guided_lgp.logic import (
+    Action,
+    Objective,
+    State,
+    Symbols,
+    parse_objective,
+    parse_skeleton,
+    progress,
+)
 from guided_lgp.policy.paper.encoding import Encoding
 from guided_lgp.policy.paper.inference import FLOOR, load_networks
 from guided_lgp.policy.paper.model import Model
@@ -28,7 +36,7 @@ ACTIONS = [
     *(Action("grasp", names) for names in product(GRIPPERS, BOXES)),
     *(Action("place", names) for names in product(GRIPPERS, BOXES, TABLES)),
 ]
-Situation = tuple[Objective, State, dict[str, Array]]
+Situation = tuple[Objective, State, Symbols, dict[str, Array]]
 
 
 def classifiers(encoding: Encoding) -> dict[str, dict[str, Classifier]]:
@@ -65,7 +73,8 @@ def scene() -> Scene:
 def situation(scene: Scene) -> Situation:
     path = parse_skeleton("(grasp pr2L red)")
     objective = parse_objective(["(on red tab2)", "(on blue red)"])
-    return objective, progress(scene.state, path), positions_along(scene, path)[-1]
+    state = progress(scene.state, path)
+    return objective, state, scene.symbols, positions_along(scene, path)[-1]
 
 
 def test_probabilities_of_all_actions_sum_to_one(models: Path, situation: Situation) -> None:
@@ -77,7 +86,7 @@ def test_probabilities_of_all_actions_sum_to_one(models: Path, situation: Situat
 def test_scores_are_the_product_of_the_conditionals_of_torch(
     models: Path, situation: Situation, scene: Scene
 ) -> None:
-    objective, state, positions = situation
+    objective, state, _, positions = situation
     encoding, networks = Encoding(), classifiers(Encoding())
     slots = encoding.fill(objective, state, scene.symbols)
     code = [
@@ -124,7 +133,9 @@ def test_an_action_on_a_symbol_without_slot_has_the_floor(models: Path, scene: S
     actions = [Action("grasp", ("pr2L", box)) for box in ("red", "pink")]
     for goal, floor in (("(held red)", [False, True]), ("(held pink)", [False, False])):
         objective = parse_objective([goal])
-        scores = policy.log_probabilities(objective, larger.state, positions, actions)
+        scores = policy.log_probabilities(
+            objective, larger.state, larger.symbols, positions, actions
+        )
         assert (scores == FLOOR).tolist() == floor
 
 

@@ -4,6 +4,7 @@ import json
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
@@ -21,10 +22,11 @@ from guided_lgp.logic import (
     Goal,
     Objective,
     State,
+    Symbols,
     applicable_actions,
     successor,
 )
-from guided_lgp.policy.registry import load_policy
+from guided_lgp.policy.registry import load_policy, missing_instructions
 from guided_lgp.policy.relational.encoding import Range, graphs, situation
 from guided_lgp.policy.relational.heads import heads
 from guided_lgp.policy.relational.inference import RelationalPolicy, load_relational
@@ -38,6 +40,7 @@ GRIPPERS = {"pr2L": np.array([0.3, 0.6, 1.2]), "pr2R": np.array([0.3, -0.6, 1.2]
 class Problem(NamedTuple):
     objective: Objective
     state: State
+    symbols: Symbols
     positions: dict[str, Array]
     actions: list[Action]
 
@@ -60,7 +63,7 @@ def draw(boxes: int, tables: int, goals: int, seed: int) -> Problem:
     others = symbols.boxes + symbols.surfaces
     positions = {name: rng.uniform((0.3, -0.5, 0.6), (0.7, 0.5, 0.9)) for name in others}
     actions = list(applicable_actions(state, symbols))
-    return Problem(tuple(kinds), state, GRIPPERS | positions, actions)
+    return Problem(tuple(kinds), state, symbols, GRIPPERS | positions, actions)
 
 
 def renamed(problem: Problem, names: dict[str, str]) -> Problem:
@@ -77,6 +80,7 @@ def renamed(problem: Problem, names: dict[str, str]) -> Problem:
             {new(box): new(table) for box, table in problem.state.support},
             {new(box): new(gripper) for box, gripper in problem.state.held},
         ),
+        problem.symbols,
         {name: positions[name] for name in problem.positions},
         [Action(a.instruction, tuple(map(new, a.symbols))) for a in problem.actions],
     )
@@ -185,6 +189,15 @@ def test_what_lies_outside_the_range_of_training_looks_like_its_border(
     )
     scores = policy.log_probabilities(*border)
     np.testing.assert_array_equal(policy.log_probabilities(*beyond), scores)
+
+
+def test_a_domain_may_have_an_instruction_without_a_head(policy: RelationalPolicy) -> None:
+    domain = load_domain()
+    assert missing_instructions(policy, domain) == ()
+    push = replace(domain.instructions[1], name="push")
+    wider = replace(domain, instructions=(*domain.instructions, push))
+    assert missing_instructions(policy, wider) == ("push",)
+    assert missing_instructions(object(), wider) == ()
 
 
 def test_files_are_read_back_without_torch(models: Path, policy: RelationalPolicy) -> None:

@@ -1,18 +1,17 @@
 """The trained policy: a probability over high-level actions (paper, Sec. II-A)."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from guided_lgp.errors import InputError
-from guided_lgp.logic import Action, Objective, State
+from guided_lgp.logic import Action, Objective, State, Symbols
 from guided_lgp.policy.arrays import FloatArray
 from guided_lgp.policy.paper.encoding import Encoding
 from guided_lgp.policy.paper.model import Layers, Model, load_model
 from guided_lgp.policy.paper.signature import INSTRUCTION
-from guided_lgp.policy.symbols import declared_symbols
 
 FLOOR = np.log(1e-6)
 """Log-probability of an action on a symbol that fills no slot: the networks cannot see it, and a
@@ -30,19 +29,20 @@ class HierarchicalPolicy:
         self._chains = {network: tuple(m.sub_policies.values()) for network, m in models.items()}
         self.encoding: Encoding = models[INSTRUCTION].encoding
 
+    @property
+    def instructions(self) -> Collection[str]:
+        """The instructions that there are networks for."""
+        return self.encoding.signature.instructions
+
     def log_probabilities(
         self,
         objective: Objective,
         state: State,
+        symbols: Symbols,
         positions: Mapping[str, NDArray[np.float64]],
         actions: Sequence[Action],
     ) -> NDArray[np.float64]:
-        """Score applicable actions; see :class:`guided_lgp.search.policy.Policy`.
-
-        The order of ``positions`` is the order in which the symbols are declared, which decides
-        about their slots.
-        """
-        symbols = declared_symbols(state, positions)
+        """Score applicable actions; see :class:`guided_lgp.search.policy.Policy`."""
         slots = self.encoding.fill(objective, state, symbols)
         code = np.concatenate(
             [

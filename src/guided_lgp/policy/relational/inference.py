@@ -1,16 +1,15 @@
 """The trained relational policy: a probability over high-level actions, without torch."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from guided_lgp.logic import Action, Objective, State
+from guided_lgp.logic import Action, Objective, State, Symbols
 from guided_lgp.policy.relational.encoding import graphs, situation
 from guided_lgp.policy.relational.heads import heads
 from guided_lgp.policy.relational.model import Weights, load_weights
-from guided_lgp.policy.symbols import declared_symbols
 
 
 class RelationalPolicy:
@@ -19,15 +18,20 @@ class RelationalPolicy:
     def __init__(self, weights: Weights) -> None:
         self._weights = weights
 
+    @property
+    def instructions(self) -> Collection[str]:
+        """The instructions that there are heads for."""
+        return heads(self._weights.domain)
+
     def log_probabilities(
         self,
         objective: Objective,
         state: State,
+        symbols: Symbols,
         positions: Mapping[str, NDArray[np.float64]],
         actions: Sequence[Action],
     ) -> NDArray[np.float64]:
         """Score applicable actions; see :class:`guided_lgp.search.policy.Policy`."""
-        symbols = declared_symbols(state, positions)
         problem = situation(objective, state, positions, symbols)
         scores = self._weights.scores(graphs(problem, self._weights.limits))
         gripper = {name: row for row, name in enumerate(symbols.grippers)}
