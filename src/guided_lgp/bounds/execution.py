@@ -11,8 +11,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from guided_lgp.bounds.checks import Violation, box_sizes
 from guided_lgp.bounds.results import Array, Trajectory
-from guided_lgp.bounds.verify.geometry import Violation, box_sizes, grasp_faults
+from guided_lgp.bounds.verify.geometry import grasp_faults
 from guided_lgp.bounds.verify.path import switches_of
 from guided_lgp.logic import Goal, Objective, Skeleton, successor
 from guided_lgp.poses import compose, inverse

@@ -1,8 +1,12 @@
 """``balanced(box, support)``: the centres of mass of a stack are above what supports it."""
 
+import math
+from collections.abc import Mapping
+
 import casadi as ca
 import numpy as np
 
+from guided_lgp.bounds.checks import Pose, Top, Vector, axes_of, dot
 from guided_lgp.bounds.program.context import Context
 from guided_lgp.bounds.program.kernels import SCALE, Kernel, in_frame, kernel
 from guided_lgp.bounds.program.kinematics import RobotKinematics
@@ -13,6 +17,8 @@ STACK = 8
 """Most boxes in one sum of weights."""
 _LEAST = 1e-3
 """Half (m) of the area that is left on a support narrower than the margins."""
+BALANCE_INSET = 0.005
+"""How far (m) inside the support's top a centre of mass lies at least."""
 
 
 def _kernels(robot: RobotKinematics) -> tuple[Kernel, ...]:
@@ -53,6 +59,48 @@ def _rows(context: Context, stack: tuple[str, ...], support: str) -> None:
         (*inner(context, support), *shares),
         ("support", stack[0], support),
     )
+
+
+def check(
+    box: str,
+    boxes: Mapping[str, Pose],
+    sizes: Mapping[str, Vector],
+    support: Mapping[str, str],
+    top: Top,
+) -> float:
+    """By how much (m) the centre of mass of a stack is outside of what carries it.
+
+    Args:
+        box: at the bottom of the stack.
+        boxes: poses of all boxes.
+        sizes: their extents (m).
+        support: what each stands on.
+        top: of the box's support.
+    """
+    x, y, _ = _centre_of_mass(box, boxes, sizes, support)
+    offset, axes = (x - top.pose[0], y - top.pose[1], 0.0), axes_of(top.pose)
+    return max(abs(dot(offset, axes[axis])) - top.half[axis] + BALANCE_INSET for axis in (0, 1))
+
+
+def _centre_of_mass(
+    box: str,
+    boxes: Mapping[str, Pose],
+    sizes: Mapping[str, Vector],
+    support: Mapping[str, str],
+) -> Vector:
+    """Of the box and everything it carries; boxes are equally dense."""
+    if box not in support.values():
+        x, y, z = boxes[box][:3]
+        return x, y, z
+    group = [box]
+    for base in group:  # grows while it is walked
+        group += [above for above, below in support.items() if below == base]
+    weights = [math.prod(sizes[name]) for name in group]
+    x, y, z = (
+        sum(w * boxes[name][axis] for w, name in zip(weights, group, strict=True)) / sum(weights)
+        for axis in range(3)
+    )
+    return x, y, z
 
 
 TERM = Term(_add, _kernels)

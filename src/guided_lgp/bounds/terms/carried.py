@@ -1,10 +1,12 @@
 """``carried(box)``: what stands on a box keeps its place on it while the box is moved."""
 
+import math
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from guided_lgp.bounds.checks import Pose, angle_of, axes_of, dot, offset_of
 from guided_lgp.bounds.program.context import Context
 from guided_lgp.bounds.program.draft import Draft
 from guided_lgp.bounds.program.kernels import SCALE, Kernel, in_frame, kernel
@@ -12,6 +14,9 @@ from guided_lgp.bounds.program.kinematics import RobotKinematics
 from guided_lgp.bounds.program.slots import PlanarPose
 from guided_lgp.bounds.results import Array
 from guided_lgp.bounds.terms.term import Term
+
+RIGID_POSITION, RIGID_ANGLE = 0.001, 0.01
+"""How far (m, rad) a box may slip between keyframes in what holds or supports it."""
 
 
 def _kernels(robot: RobotKinematics) -> tuple[Kernel, ...]:
@@ -47,6 +52,28 @@ def carry(draft: Draft, old: Array, before: Array, new: Array, after: PlanarPose
     draft.values[after.x] = new[0] + cosine * dx - sine * dy
     draft.values[after.y] = new[1] + sine * dx + cosine * dy
     draft.values[after.yaw] = before[2] + turn
+
+
+# check
+
+Relative = tuple[list[float], list[float]]
+"""Position of a box and cosines of its axes in the frame of what carries it."""
+
+
+def relative(placement: Pose, carrier: Pose | None) -> Relative:
+    """Where a box is in its carrier; in the world without one."""
+    if carrier is None:
+        return list(placement[:3]), [c for axis in axes_of(placement) for c in axis]
+    offset, axes = offset_of(carrier, placement), axes_of(carrier)
+    position = [dot(offset, axis) for axis in axes]
+    return position, [dot(side, axis) for side in axes_of(placement) for axis in axes]
+
+
+def check(before: Relative, after: Relative) -> float:
+    """By how much more (m or rad) than allowed a box has slipped: negative where it is carried."""
+    slip = math.dist(before[0], after[0])
+    turn = angle_of((sum(a * b for a, b in zip(before[1], after[1], strict=True)) - 1) / 2)
+    return max(slip - RIGID_POSITION, turn - RIGID_ANGLE)
 
 
 TERM = Term(_add, _kernels)

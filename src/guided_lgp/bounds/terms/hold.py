@@ -10,6 +10,7 @@ from collections.abc import Iterable
 import casadi as ca
 import numpy as np
 
+from guided_lgp.bounds.checks import Pose, Vector, angle_of, axes_of, dot, offset_of
 from guided_lgp.bounds.program.context import Context, Line
 from guided_lgp.bounds.program.draft import Draft
 from guided_lgp.bounds.program.grasp import tool_target
@@ -23,9 +24,15 @@ from guided_lgp.bounds.program.slots import (
 )
 from guided_lgp.bounds.results import Array
 from guided_lgp.bounds.terms.term import Term, UngraspableError
+from guided_lgp.scene.model import grasp_axis
+from guided_lgp.scene.world import MARGIN
 
 PAD_MARGIN = 0.01
 """How far inside the box's side the fingertips are (m)."""
+GRASP_OFFSET = 0.003
+"""How far (m) a grasped box may be off the middle between the fingers."""
+GRASP_ANGLE = 0.03
+"""How far (rad) its side may be off the fingers' closing direction."""
 
 
 def _kernel(chain: Chain, fixed: int) -> Kernel:
@@ -231,5 +238,33 @@ _MOTION = 0.05
 """Cost per rad^2 of shoulder and elbow from the arm's side: only among what is reached."""
 _SHOULDER_JOINTS = 4
 """The joints that move most of the arm; the wrist turns at no cost."""
+
+
+# check
+
+
+def check(size: Vector, placement: Pose, tool: Pose, palm_front: float) -> float:
+    """By how much (m or rad) a hand is not where it holds a box: negative where it is.
+
+    The fingers close across the box's narrower side, the box is in the middle between them, and
+    the palm is outside of it.
+
+    Args:
+        size: extents (m) of the box.
+        placement: its pose.
+        tool: pose of the gripper's tool frame.
+        palm_front: x of the palm's front in the tool frame (m).
+    """
+    approach, closing, _ = axes_of(tool)
+    sides, offset = axes_of(placement), offset_of(tool, placement)
+    reach = dot(offset, approach)
+    for axis in range(3):
+        reach -= size[axis] / 2 * abs(dot(approach, sides[axis]))
+    return max(
+        angle_of(abs(dot(closing, sides[grasp_axis(size)]))) - GRASP_ANGLE,
+        abs(dot(offset, closing)) - GRASP_OFFSET,
+        palm_front - MARGIN - reach,
+    )
+
 
 TERM = Term(_add, _kernels)

@@ -4,6 +4,8 @@ from guided_lgp.bounds.program.context import Context
 from guided_lgp.bounds.terms.hold import configuration
 from guided_lgp.bounds.terms.term import Term
 
+CARRY_ANGLE = 0.05
+"""Tilt (rad) up to which a box that carries others is level while it moves."""
 LIFT = 0.08
 """How far a box that carries others is lifted (m)."""
 

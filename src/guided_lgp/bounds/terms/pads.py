@@ -2,15 +2,19 @@
 
 import casadi as ca
 
+from guided_lgp.bounds.checks import Pose, Vector, axes_of, dot, offset_of
 from guided_lgp.bounds.program.context import Context
 from guided_lgp.bounds.program.grasp import tool_target
 from guided_lgp.bounds.program.kernels import SCALE, Kernel, kernel
 from guided_lgp.bounds.program.kinematics import Chain, RobotKinematics
 from guided_lgp.bounds.terms.hold import PAD_MARGIN, grip
 from guided_lgp.bounds.terms.term import Term
+from guided_lgp.scene.model import grasp_axis
 
 PAD_CENTRE = -0.02
 """x of the centre of the fingertips' pads in the tool frame (m)."""
+GRASP_INSET = 0.005
+"""How far inside the box's side the fingertips' centre lies at least (m)."""
 
 
 def _kernel(chain: Chain) -> Kernel:
@@ -44,6 +48,19 @@ def _add(context: Context, gripper: str, box: str) -> None:
         (held.half_length, held.half_height, *inner),
         ("grip", gripper, box),
     )
+
+
+def check(size: Vector, placement: Pose, tool: Pose) -> float:
+    """By how much (m) the fingertips' centre is not on the box's side: negative where it is.
+
+    Args:
+        size: extents (m) of the box.
+        placement: its pose.
+        tool: pose of the gripper's tool frame.
+    """
+    sides, offset = axes_of(placement), offset_of(tool, placement)
+    along = (axis for axis in range(3) if axis != grasp_axis(size))
+    return max(abs(dot(offset, sides[axis])) - (size[axis] / 2 - GRASP_INSET) for axis in along)
 
 
 TERM = Term(_add, _kernels)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from guided_lgp.bounds.checks import Pose, Top, Vector, angle_of, axes_of
 from guided_lgp.bounds.program.context import Context, Start
 from guided_lgp.bounds.program.draft import Draft
 from guided_lgp.bounds.program.slots import HeldBox, PlanarPose, StraightSegment
@@ -17,6 +18,10 @@ from guided_lgp.bounds.terms.term import Term
 
 CANDIDATES = 6
 """Placements drawn, of which the best to reach is taken."""
+LEVEL_ANGLE = 0.02
+"""Tilt (rad) up to which a box at rest is level."""
+HEIGHT = 0.002
+"""How far (m) the bottom of a box may be off its support's top."""
 _OVERLAP = 20.0
 """Cost per m of overlap with a neighbour: as much as what is missing to reach."""
 
@@ -100,6 +105,22 @@ def _add(context: Context, box: str, support: str) -> None:
             others=context.choices[-1],
         )
     )
+
+
+def check(size: Vector, placement: Pose, top: Top) -> float:
+    """By how much (m or rad) a box does not stand level on a top: negative where it does."""
+    tilted = max(tilt(placement), tilt(top.pose)) - LEVEL_ANGLE
+    return max(tilted, gap(size, placement, top) - HEIGHT)
+
+
+def tilt(placement: Pose) -> float:
+    """Angle (rad) of a body's z axis from the vertical."""
+    return angle_of(axes_of(placement)[2][2])
+
+
+def gap(size: Vector, placement: Pose, top: Top) -> float:
+    """Distance (m) of a level box's bottom from a top."""
+    return abs(placement[2] - size[2] / 2 - top.height)
 
 
 TERM = Term(_add)

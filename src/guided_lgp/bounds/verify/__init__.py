@@ -14,7 +14,7 @@ carry), ``start`` (not with both arms at their side), ``skeleton`` (an action is
 ``joint names`` (not those of arms and fingers, each once).
 """
 
-from guided_lgp.bounds.verify.geometry import Violation
+from guided_lgp.bounds.checks import Violation
 from guided_lgp.bounds.verify.keyframes import verify_keyframe, verify_keyframes
 from guided_lgp.bounds.verify.path import PathReport, verify_path
 

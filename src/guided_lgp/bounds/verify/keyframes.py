@@ -5,24 +5,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from guided_lgp.bounds.checks import Violation, box_sizes
 from guided_lgp.bounds.results import Array, Keyframe
-from guided_lgp.bounds.verify.geometry import (
-    Violation,
-    angle_of,
-    axes_of,
-    box_sizes,
-    declared,
-    dot,
-    grasp_faults,
-    offset_of,
-    placement_faults,
-)
+from guided_lgp.bounds.terms import carried
+from guided_lgp.bounds.terms.carried import Relative, relative
+from guided_lgp.bounds.verify.geometry import declared, grasp_faults, placement_faults
 from guided_lgp.logic import Action, Skeleton, State, successor
 from guided_lgp.robots import Robot
 from guided_lgp.scene.world import World, initial_poses
 
-RIGID_POSITION, RIGID_ANGLE = 0.001, 0.01
-"""How far (m, rad) a box may slip between keyframes in what holds or supports it."""
 LIMIT_TOLERANCE = 1e-6
 
 
@@ -136,24 +127,16 @@ class _Frames:
         self.boxes = {name: placement.tolist() for name, placement in keyframe.boxes.items()}
         self.frames |= self.boxes
 
-    def relative(self, box: str, carrier: str) -> tuple[list[float], list[float]]:
-        """Position of the box and cosines of its axes in the carrier's frame."""
-        placement = self.boxes[box]
-        frame = self.frames.get(carrier)
-        if frame is None:  # a table
-            return placement[:3], [c for axis in axes_of(placement) for c in axis]
-        offset, axes = offset_of(frame, placement), axes_of(frame)
-        position = [dot(offset, axis) for axis in axes]
-        return position, [dot(side, axis) for side in axes_of(placement) for axis in axes]
+    def relative(self, box: str, carrier: str) -> Relative:
+        """Where the box is in its carrier."""
+        return relative(self.boxes[box], self.frames.get(carrier))
 
 
 def _slips(last: _Frames, reached: _Frames, state: State) -> list[Violation]:
     """Boxes that moved relative to what holds or supports them in this mode."""
     found = []
     for box, carrier in (*state.held, *state.support):
-        (position, cosines), (before, were) = (m.relative(box, carrier) for m in (reached, last))
-        slip = math.dist(position, before)
-        turn = angle_of((sum(a * b for a, b in zip(cosines, were, strict=True)) - 1) / 2)
-        if slip > RIGID_POSITION or turn > RIGID_ANGLE:
-            found.append(Violation(f"rigid {box}", max(slip, turn)))
+        amount = carried.check(last.relative(box, carrier), reached.relative(box, carrier))
+        if amount > 0:
+            found.append(Violation(f"rigid {box}", amount))
     return found

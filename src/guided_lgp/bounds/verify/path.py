@@ -7,14 +7,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from guided_lgp.bounds.checks import Violation, box_sizes
 from guided_lgp.bounds.results import Array, Attachment, Trajectory
-from guided_lgp.bounds.verify.geometry import (
-    Violation,
-    box_sizes,
-    declared,
-    grasp_faults,
-    placement_faults,
-)
+from guided_lgp.bounds.verify.geometry import declared, grasp_faults, placement_faults
 from guided_lgp.bounds.verify.keyframes import LIMIT_TOLERANCE
 from guided_lgp.bounds.verify.phase import Phase
 from guided_lgp.logic import Skeleton, State, applicable_actions, successor

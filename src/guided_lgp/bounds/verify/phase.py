@@ -5,8 +5,9 @@ from itertools import product
 
 import numpy as np
 
+from guided_lgp.bounds.checks import Violation, box_sizes
 from guided_lgp.bounds.results import Array
-from guided_lgp.bounds.verify.geometry import CARRY_ANGLE, Violation, box_sizes
+from guided_lgp.bounds.terms.level import CARRY_ANGLE
 from guided_lgp.logic import State
 from guided_lgp.poses import apply, compose, inverse, tilt
 from guided_lgp.robots import Arm

@@ -1,0 +1,80 @@
+"""What numeric checks share: violations, and poses as plain floats.
+
+Poses are sequences of seven floats here, ``[x, y, z, qx, qy, qz, qw]``: for single poses that is
+many times faster than arrays.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from guided_lgp.poses import pose
+from guided_lgp.scene import Scene
+
+Pose = Sequence[float]
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Violation:
+    """A constraint that does not hold."""
+
+    constraint: str
+    amount: float
+    """By how much, in m, rad, or units of the limit; 0 where there is no amount."""
+    action: int = -1
+    """Index of the action in the skeleton, where there is one."""
+    time: float = math.nan
+    """Where on a path (s)."""
+
+    def __str__(self) -> str:
+        return f"{self.constraint} by {self.amount:.3g}"
+
+
+def box_sizes(scene: Scene) -> dict[str, tuple[float, float, float]]:
+    """Extents (m) of every box."""
+    return {box.name: box.size for box in scene.boxes}
+
+
+@dataclass(frozen=True)
+class Top:
+    """What a box can stand on: pose of the body, half extents and height of its top (m)."""
+
+    pose: Pose
+    half: Sequence[float]
+    height: float
+
+
+def top_of(scene: Scene, boxes: Mapping[str, Pose], name: str) -> Top:
+    """The top of a table or of a box."""
+    size = box_sizes(scene).get(name)
+    if size is not None:
+        half = [side / 2 for side in size]
+        return Top(boxes[name], half, boxes[name][2] + half[2])
+    table = next(table for table in scene.tables if table.name == name)
+    return Top(pose(table.position, table.yaw).tolist(), table.half_extents, table.position[2])
+
+
+def axes_of(pose: Pose) -> tuple[Vector, Vector, Vector]:
+    """The body's x, y and z axis in the world."""
+    _, _, _, x, y, z, w = pose
+    return (
+        (1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)),
+        (2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)),
+        (2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)),
+    )
+
+
+def dot(first: Sequence[float], second: Sequence[float]) -> float:
+    """Scalar product of two vectors (3,)."""
+    return first[0] * second[0] + first[1] * second[1] + first[2] * second[2]
+
+
+def offset_of(origin: Sequence[float], target: Sequence[float]) -> Vector:
+    """From one position to another, in the world."""
+    return (target[0] - origin[0], target[1] - origin[1], target[2] - origin[2])
+
+
+def angle_of(cosine: float) -> float:
+    """The angle (rad) of a cosine that rounding may have put beyond one."""
+    return math.acos(max(-1.0, min(1.0, cosine)))
