@@ -9,27 +9,20 @@ import outputs
 import pytest
 
 from guided_lgp.errors import InputError
+from guided_lgp.logic import Action, Goal
 from guided_lgp.poses import compose, inverse, pose
 from guided_lgp.scene import Scene, generate
 from guided_lgp.scene.world import COLOURS
+from guided_lgp.view import motion
 from guided_lgp.view.live import view
-from guided_lgp.view.replay import play, replay_html
+from guided_lgp.view.motion import frames, play, steps
+from guided_lgp.view.replay import replay_html
 from guided_lgp.view.viewer import Viewer, box_colours
 
 
 @pytest.fixture(scope="module")
 def scene() -> Scene:
     return generate("a", 1, 0, "<b>scene").scenes[0]
-
-
-def test_tool_pose_agrees_with_the_kinematics(scene: Scene) -> None:
-    q = outputs.motion("red").q[25]
-    with Viewer(scene) as viewer:
-        viewer.configure(dict(zip(scene.robot.description.joint_names, q, strict=True)))
-        for gripper in ("pr2L", "pr2R"):
-            assert np.allclose(
-                viewer.tool_pose(gripper), scene.robot.tool_pose(q, gripper), atol=1e-9
-            )
 
 
 def test_an_attached_box_follows_the_tool_and_stays_where_it_is_left(scene: Scene) -> None:
@@ -41,7 +34,7 @@ def test_an_attached_box_follows_the_tool_and_stays_where_it_is_left(scene: Scen
     end = compose(scene.robot.tool_pose(trajectory.q[carried.end], "pr2L"), grasp)
     assert np.linalg.norm(end[:3] - start[:3]) > 0.1
     with Viewer(scene) as viewer:
-        total = sum(play(viewer, trajectory))
+        total = sum(play(viewer, frames(scene, trajectory)))
         shown = viewer.server.scene.get_handle_by_name(f"/boxes/{name}")
         assert shown is not None
         assert np.allclose(shown.position, end[:3], atol=1e-4)
@@ -102,3 +95,18 @@ def test_live_view_serves_the_loopback_interface_until_stopped(scene: Scene) -> 
         stop.set()
         thread.join(30)
     assert not thread.is_alive()
+
+
+def test_steps_begin_with_the_switch_before_and_lead_the_player(
+    scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    trajectory = outputs.motion(scene.boxes[0].name)
+    skeleton = (Action("grasp", ("pr2L", "red")), Action("place", ("pr2L", "red", "green")))
+    assert steps(scene, skeleton[::-1], trajectory) == []
+    monkeypatch.setattr(motion, "switches_of", lambda *_: [5, 9])
+    assert [step.time for step in steps(scene, skeleton, trajectory)] == [0, trajectory.times[5]]
+    page = tmp_path / "page.html"
+    replay_html(trajectory, scene, page, skeleton, (Goal("on", ("red", "green")),))
+    text = page.read_text(encoding="utf-8")
+    assert '<button data-time="1.0">(grasp pr2L red)</button>' in text
+    assert "<strong>(on red green)</strong>" in text

@@ -114,6 +114,8 @@ def view(
         found.trajectory if found else None,
         port,
         announce=lambda address: typer.echo(f"{address} (Ctrl-C ends it)"),
+        skeleton=found.skeleton if found else (),
+        objective=found.goals if found else (),
     )
 
 

@@ -179,7 +179,7 @@ def plan(
         from guided_lgp.view.replay import replay_html
 
         with spinner("writing the replay"):
-            replay_html(path.trajectory, start, html)
+            replay_html(path.trajectory, start, html, path.skeleton, objective)
     if as_json:
         typer.echo(json.dumps(summary, indent=1))
         return

@@ -156,7 +156,7 @@ def _replays(inputs: Inputs, bounds: BoundsParams, reports: Path) -> list[tuple[
             trajectory = SceneBounds(scene, bounds).path(actions).trajectory
             if trajectory is not None:
                 address = f"replays/{setup}.html"
-                replay_html(trajectory, scene, reports / address)
+                replay_html(trajectory, scene, reports / address, actions)
                 planner = TABLE_3[str(plan.planner)].label
                 text = f"{plan.objective}: {len(actions)} actions, {planner}"
                 written.append((address, f"Problem {plan.problem}, {text}"))

@@ -11,7 +11,7 @@ from guided_lgp.documents import written_whole
 from guided_lgp.poses import Array
 from guided_lgp.scene.model import Scene
 from guided_lgp.scene.world import Camera, World
-from guided_lgp.view.replay import play
+from guided_lgp.view.motion import frames, play
 
 _FRAMES_PER_S = 12.5
 """GIF counts hundredths of a second: eight of them."""
@@ -20,24 +20,21 @@ _COLOURS = 128
 
 
 class _Stage:
-    """PyBullet in the place of the 3D viewer; see :class:`guided_lgp.view.replay.Stage`."""
+    """PyBullet in the place of the 3D viewer; see :class:`guided_lgp.view.motion.Stage`."""
 
     def __init__(self, scene: Scene, world: World) -> None:
-        self.scene = scene
+        self._robot = scene.robot.description
         self._world = world
         self._q: Array = scene.robot.description.home
         self._fingers: dict[str, float] = {}
 
     def configure(self, joints: Mapping[str, float]) -> None:
-        robot = self.scene.robot.description
+        robot = self._robot
         self._q = np.array([joints[name] for name in robot.joint_names])
         self._fingers = robot.finger_values(
             np.array([joints[name] for name in robot.moving_joints])
         )
         self._world.set(self._q, {}, self._fingers)
-
-    def tool_pose(self, gripper: str) -> Array:
-        return self.scene.robot.tool_pose(self._q, gripper)
 
     def move_box(self, name: str, box_pose: Array) -> None:
         self._world.set(self._q, {name: box_pose}, self._fingers)
@@ -61,21 +58,21 @@ def write_film(
     camera = Camera(view=34.0, width=width, height=width * 5 // 8)
     pictures, due = [], 0.0
     with World(scene) as world:
-        for wait in play(_Stage(scene, world), trajectory):
+        for wait in play(_Stage(scene, world), frames(scene, trajectory)):
             due -= wait / speed
             if due < 0.0:
                 pictures.append(Image.fromarray(world.render(camera)))
                 due += 1.0 / _FRAMES_PER_S
         pictures.append(Image.fromarray(world.render(camera)))
     palette = pictures[0].quantize(_COLOURS)
-    frames = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
+    drawn = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
     step = round(1000 / _FRAMES_PER_S)
     with written_whole(path) as file:
-        frames[0].save(
+        drawn[0].save(
             file,
             "GIF",
             save_all=True,
-            append_images=frames[1:],
-            duration=[step] * (len(frames) - 1) + [2000],
+            append_images=drawn[1:],
+            duration=[step] * (len(drawn) - 1) + [2000],
             loop=0,
         )

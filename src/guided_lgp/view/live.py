@@ -1,16 +1,20 @@
 """A scene, or the motion of a plan, live in the browser."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
+from functools import partial
 from threading import Event
+from typing import Any
+
+import numpy as np
 
 from guided_lgp.bounds.results import Trajectory
+from guided_lgp.logic import Objective, Skeleton, format_objective
 from guided_lgp.scene.model import Scene
-from guided_lgp.view.replay import play
+from guided_lgp.view.motion import FRAME_RATE, Frame, Step, frames, show, steps
 from guided_lgp.view.viewer import Viewer
 
-_PAUSE_S = 2.0
-"""Between two rounds of a motion (s)."""
+_SPEEDS = ("0.5", "1", "2", "4")
 
 
 def view(
@@ -19,21 +23,70 @@ def view(
     port: int = 8080,
     announce: Callable[[str], None] = print,
     stop: Event | None = None,
+    *,
+    skeleton: Skeleton = (),
+    objective: Objective = (),
 ) -> None:
     """Serve a scene on the loopback interface until interrupted (Ctrl-C).
 
     Args:
-        scene: the scene to show, both arms at their side.
-        trajectory: a motion that starts in the scene; it is played over and over.
+        scene: the scene to show, all arms at their side.
+        trajectory: a motion that starts in the scene; it is played over and over, with controls.
         port: TCP port on 127.0.0.1; the next free one is taken if it is in use.
         announce: is given the address to open.
         stop: ends the service when set.
+        skeleton: the actions of the motion, shown as buttons that lead to them.
+        objective: what the motion achieves, for its heading.
     """
     stop = stop or Event()
     with Viewer(scene, port) as viewer, suppress(KeyboardInterrupt):
+        player = None
+        if trajectory is not None:
+            listed = steps(scene, skeleton, trajectory)
+            player = _Player(viewer, frames(scene, trajectory), listed, objective)
         announce(f"http://127.0.0.1:{viewer.server.get_port()}")
-        while not stop.wait(_PAUSE_S):
-            if trajectory is not None:
-                for wait in play(viewer, trajectory):
-                    if stop.wait(wait):
-                        return
+        while not stop.wait(1.0 / FRAME_RATE):
+            if player is not None:
+                player.tick(1.0 / FRAME_RATE)
+
+
+class _Player:
+    """A motion with its controls: play and pause, time, speed, and a button per action."""
+
+    def __init__(
+        self, viewer: Viewer, shown: Sequence[Frame], listed: Sequence[Step], objective: Objective
+    ) -> None:
+        self._viewer = viewer
+        self._frames = shown
+        self._times = np.array([frame.time for frame in shown])
+        self._steps = listed
+        gui = viewer.server.gui
+        gui.add_markdown(f"**{format_objective(objective)}**")
+        self._current = gui.add_markdown("")
+        self._playing = gui.add_checkbox("play", initial_value=True)
+        end = max(round(float(self._times[-1]), 2), 0.1)
+        self._time: Any = gui.add_slider("time (s)", 0.0, end, 0.01, 0.0)
+        self._speed = gui.add_dropdown("speed", _SPEEDS, initial_value="1")
+        for step in listed:
+            gui.add_button(step.text).on_click(partial(self._go, step.time))
+        self._shown = -1.0
+
+    def _go(self, time: float, _: object) -> None:
+        self._time.value = time
+
+    def tick(self, elapsed: float) -> None:
+        """Show what the controls ask for, ``elapsed`` seconds after the last time."""
+        now = float(self._time.value)
+        if self._playing.value and now == self._shown:
+            now = round(now + elapsed * float(self._speed.value), 2)
+            now = now if now <= self._times[-1] else 0.0
+            self._time.value = now
+        if now != self._shown:
+            self._shown = now
+            row = int(np.searchsorted(self._times, now, side="right")) - 1
+            show(self._viewer, self._frames[max(row, 0)])
+            self._current.content = self._action(now)
+
+    def _action(self, now: float) -> str:
+        begun = [number for number, step in enumerate(self._steps) if step.time <= now]
+        return f"{begun[-1] + 1} `{self._steps[begun[-1]].text}`" if begun else ""

@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio
 import viser
 
-from guided_lgp.poses import Array, compose, pose
+from guided_lgp.poses import Array, pose
 from guided_lgp.scene.model import Scene
 from guided_lgp.scene.world import COLOURS, TABLE_THICKNESS
 
@@ -72,14 +72,6 @@ class Viewer:
             local = self._data.liMi[self._model.getJointId(name)]
             _move(self._joints[name], np.array(pinocchio.SE3ToXYZQUAT(local)))
 
-    def tool_pose(self, gripper: str) -> Array:
-        """Pose (7,) of the gripper's tool frame in the world, at the current configuration."""
-        arm = self._robot.arms[gripper]
-        frame = self._model.getFrameId(arm.tool_link)
-        placement = pinocchio.updateFramePlacement(self._model, self._data, frame)
-        link = compose(self.scene.robot.base_pose, np.array(pinocchio.SE3ToXYZQUAT(placement)))
-        return compose(link, arm.tool_in_link)
-
     def move_box(self, name: str, box_pose: Array) -> None:
         """Put a box at a pose (7,) in the world."""
         _move(self._boxes[name], box_pose)
@@ -89,8 +81,8 @@ class Viewer:
         scene.set_up_direction("+z")
         scene.add_grid("/floor", 4.0, 4.0, cell_size=0.5, section_size=1.0)
         camera = self.server.initial_camera
-        camera.position = (2.2, -0.6, 1.7)
-        camera.look_at = (0.3, 0.0, 0.82)
+        camera.position = (2.6, -0.7, 1.8)
+        camera.look_at = (0.2, 0.0, 0.72)
         camera.fov = 0.75
 
     def _add_robot(self) -> None:
@@ -138,6 +130,7 @@ class Viewer:
                 cast_shadow=False,
                 **_pose(pose((x, y, top - TABLE_THICKNESS / 2), table.yaw)),
             )
+            self._label(f"/tables/{table.name}", (table.half_extents[0], 0.0, -0.05))
         for box, colour in zip(self.scene.boxes, box_colours(self.scene), strict=True):
             self._boxes[box.name] = scene.add_box(
                 f"/boxes/{box.name}",
@@ -145,6 +138,14 @@ class Viewer:
                 box.size,
                 **_pose(pose(box.position, box.yaw)),
             )
+            self._label(f"/boxes/{box.name}", (0.0, 0.0, box.size[2] / 2 + 0.01))
+
+    def _label(self, body: str, position: tuple[float, float, float]) -> None:
+        """Write a body's name beside it, where it goes with it."""
+        name = body.rpartition("/")[-1]
+        self.server.scene.add_label(
+            f"{body}/name", name, position=position, font_screen_scale=0.8, anchor="bottom-center"
+        )
 
 
 def box_colours(scene: Scene) -> list[Colour]:
