@@ -70,6 +70,7 @@ class CollisionChecker:
             self._bodies.setdefault(name, []).append(number)
         self._arm = {g: self._shapes(*arm.links, *arm.hand_links) for g, arm in robot.arms.items()}
         self._bodies |= {g: self._shapes(*arm.hand_links) for g, arm in robot.arms.items()}
+        self._boxes = {box.name for box in scene.boxes}
         self._tool = {gripper: self._tool_frame(arm) for gripper, arm in robot.arms.items()}
         self._candidates = self._candidate_pairs(
             len(scene.tables) + len(scene.boxes), robot.disabled_pairs
@@ -108,7 +109,11 @@ class CollisionChecker:
         }
 
     def enter(self, scene: PlanningScene) -> None:
-        """Put the boxes where the scene says, and check what can collide while its arm moves."""
+        """Put the boxes where the scene says, and check what can collide while its arm moves.
+
+        A box that the scene does not mention is nowhere.
+        """
+        here = {*scene.standing, *scene.carried}
         moving = list(self._arm[scene.gripper])
         for box, placement in scene.standing.items():
             self._move(box, 0, pin.XYZQUATToSE3(placement))
@@ -123,6 +128,8 @@ class CollisionChecker:
         carried = moving[len(self._arm[scene.gripper]) :]
         for body in carried:
             active[body, carried] = False
+        nowhere = [n for box in self._boxes - here for n in self._bodies[box]]
+        active[nowhere] = active[:, nowhere] = False
         for one, other in scene.touching:
             first, second = self._bodies[one], self._bodies[other]
             active[np.ix_(first, second)] = active[np.ix_(second, first)] = False

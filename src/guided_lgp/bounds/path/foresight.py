@@ -138,12 +138,19 @@ class Foresight:
         return {body: (holder, grasp), **riders}
 
     def _left(self, later: int, expected: Situation, target: Array) -> Situation:
-        """When the body has been let go of."""
+        """When the body has been let go of, with what stands on it."""
         body, opening = self._task.manoeuvres[later].body, self._task.manoeuvres[later].opening
+        coarse = self._task.contacts[later].boxes
+        moved = compose(target, inverse(coarse[body]))
+        riders = self._task.states[later].carried_by(body)
         opened = [] if opening is None else [Fingers(opening, self._task.opened(opening))]
         return replace(
             self._task.after(expected, opened),
-            standing={**expected.standing, body: target},
+            standing={
+                **expected.standing,
+                body: target,
+                **{rider: compose(moved, coarse[rider]) for rider in riders},
+            },
             state=self._task.states[later + 1],
         )
 
