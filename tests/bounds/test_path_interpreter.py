@@ -63,7 +63,7 @@ DOMAIN = Domain("test", paper.DOMAIN.types, (RAISE, LOWER, RECEIVE), ())
 
 @pytest.fixture
 def boxes(monkeypatch: pytest.MonkeyPatch) -> Scene:
-    monkeypatch.setattr("guided_lgp.scene.model.load_domain", lambda: DOMAIN)
+    monkeypatch.setattr("guided_lgp.scene.model.load_domain", lambda name: DOMAIN)
     return scene(red=(0.5, 0.2, 0.65, 0.2, "tab1"), green=(0.5, -0.3, 0.65, 0.1, "tab2"))
 
 

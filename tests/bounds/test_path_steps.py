@@ -5,7 +5,7 @@ from guided_lgp.bounds.path.steps import check_motions, manoeuvre
 from guided_lgp.domains import load_domain
 from guided_lgp.errors import InputError
 from guided_lgp.logic import Action, Domain
-from guided_lgp.logic.declarations import Instruction, Term, Type, attach, terms
+from guided_lgp.logic.declarations import Instruction, Term, Type, attach, free, terms
 
 Gripper, Table = Type("gripper"), Type("table")
 Box = Type("box", also=(Table,), parents=(Gripper, Table))
@@ -17,7 +17,7 @@ MOTION = (transit(g), line_in(g, back=0.05), switch(close=g), line_out(g, up=0.1
 
 
 def domain(*motion: Term) -> Domain:
-    snatch = Instruction("snatch", (g, b), (), (attach(b, g),), motion=motion)
+    snatch = Instruction("snatch", (g, b), (free(g),), (attach(b, g),), motion=motion)
     return Domain("test", (Gripper, Table, Box), (snatch,), ())
 
 

@@ -39,6 +39,10 @@ class PlanningScene:
     """Declared contacts: pairs of boxes, tables and grippers (meaning the hand)."""
 
 
+_Pattern = tuple[str, frozenset[str], frozenset[tuple[str, str]], frozenset[frozenset[str]]]
+"""What decides which pairs are checked: moving arm, standing and carried boxes, contacts."""
+
+
 class CollisionChecker:
     """Checks configurations of the robot in one scene; a planning scene says which move."""
 
@@ -86,6 +90,9 @@ class CollisionChecker:
             self._model, self._geometry, self._geometry_data
         )
         self._callback = pin.CollisionCallBackDefault(self._geometry, self._geometry_data, True)
+        self._pattern: _Pattern | None = None
+        self._patterns: dict[_Pattern, tuple[NDArray[np.bool_], list[int]]] = {}
+        self._active: list[int] = []
         self.queries = 0
         """Calls of :meth:`first_collision` so far."""
         self._template = pin.neutral(self._model)
@@ -113,28 +120,44 @@ class CollisionChecker:
 
         A box that the scene does not mention is nowhere.
         """
-        here = {*scene.standing, *scene.carried}
-        moving = list(self._arm[scene.gripper])
         for box, placement in scene.standing.items():
             self._move(box, 0, pin.XYZQUATToSE3(placement))
         for box, (gripper, grasp) in scene.carried.items():
             joint, tool = self._tool[gripper]
             self._move(box, joint, tool * pin.XYZQUATToSE3(grasp))
-            if gripper == scene.gripper:
-                moving += self._bodies[box]
+        pattern = (
+            scene.gripper,
+            frozenset(scene.standing),
+            frozenset((box, gripper) for box, (gripper, _) in scene.carried.items()),
+            scene.touching,
+        )
+        if pattern != self._pattern:
+            if pattern not in self._patterns:
+                active = self._active_pairs(scene)
+                self._patterns[pattern] = active, np.flatnonzero(active[self._pairs]).tolist()
+            self._pattern = pattern
+            active, self._active = self._patterns[pattern]
+            self._geometry_data.setActiveCollisionPairs(self._geometry, active, True)
+
+    def _active_pairs(self, scene: PlanningScene) -> NDArray[np.bool_]:
+        """Pairs of shapes of which one moves, but for declared contacts and what moves together."""
+        carried = [
+            number
+            for box, (gripper, _) in scene.carried.items()
+            for number in self._bodies[box]
+            if gripper == scene.gripper
+        ]
         moves = np.zeros(len(self._names), dtype=bool)
-        moves[moving] = True
+        moves[[*self._arm[scene.gripper], *carried]] = True
         active = self._candidates & (moves[:, None] | moves[None, :])
-        carried = moving[len(self._arm[scene.gripper]) :]
-        for body in carried:
-            active[body, carried] = False
-        nowhere = [n for box in self._boxes - here for n in self._bodies[box]]
+        active[np.ix_(carried, carried)] = False
+        absent = self._boxes - {*scene.standing, *scene.carried}
+        nowhere = [number for box in absent for number in self._bodies[box]]
         active[nowhere] = active[:, nowhere] = False
         for one, other in scene.touching:
             first, second = self._bodies[one], self._bodies[other]
             active[np.ix_(first, second)] = active[np.ix_(second, first)] = False
-        self._geometry_data.setActiveCollisionPairs(self._geometry, active, True)
-        self._active = np.flatnonzero(active[self._pairs]).tolist()
+        return np.asarray(active)
 
     def coordinates(self, q: Array, fingers: Mapping[str, float]) -> Array:
         """Coordinates of the pinocchio model (m, nq) for configurations (m, n)."""

@@ -1,6 +1,7 @@
 """Ways to hold a box: fingers across its narrower side, approach between its two ends."""
 
 from dataclasses import dataclass
+from functools import cache
 from itertools import product
 
 import numpy as np
@@ -50,17 +51,24 @@ def grips_of(box: Box, arm: Arm) -> tuple[Grips, Grips]:
 
     Both are empty for a box that is too wide for the hand.
     """
-    half = np.array(box.size) / 2
-    across = grasp_axis(box.size)
+    return _grips(box.size, arm.palm_front, arm.fingers.widest)
+
+
+@cache
+def _grips(
+    size: tuple[float, float, float], palm_front: float, widest: float
+) -> tuple[Grips, Grips]:
+    half = np.array(size) / 2
+    across = grasp_axis(size)
     along, closing = np.eye(3)[1 - across], np.eye(3)[across]
     central: list[tuple[Array, Array]] = []
     others: list[tuple[Array, Array]] = []
     pitches = np.pi * np.arange(_PITCHES + 1) / _PITCHES
-    if 2 * half[across] > arm.fingers.widest:
+    if 2 * half[across] > widest:
         pitches = pitches[:0]
     for pitch, shift, back, flip in product(pitches, _SHIFTS, _DEPTHS, (1.0, -1.0)):
         approach = np.cos(pitch) * along - np.sin(pitch) * np.array([0.0, 0.0, 1.0])
-        depth = np.abs(approach) @ half + arm.palm_front + PALM_GAP + back
+        depth = np.abs(approach) @ half + palm_front + PALM_GAP + back
         third = np.cross(approach, closing)
         offset = shift * third - depth * approach
         if np.all(np.abs(offset) <= half - _INSET):
