@@ -13,7 +13,7 @@ import pytest
 import yaml
 from typer.main import get_command
 
-from guided_lgp import cli, doctor
+from guided_lgp import __version__, cli, doctor
 from guided_lgp.errors import InputError, WorkerError
 
 ROOT = Path(__file__).parents[1]
@@ -321,3 +321,43 @@ def test_the_python_interface_from_the_documentation() -> None:
         timeout=120,
     )
     assert done.stdout.startswith("(grasp")
+
+
+def test_a_closed_pipe_is_no_error() -> None:
+    words = f"{sys.executable} -m guided_lgp.cli schema params | head -c 20"
+    done = subprocess.run(
+        ["bash", "-o", "pipefail", "-c", words],
+        cwd=ROOT,
+        text=True,
+        capture_output=True,
+        check=True,
+    )
+    assert done.stderr == ""
+    assert len(done.stdout) == 20
+
+
+def test_the_version_and_short_help(capsys: pytest.CaptureFixture[str]) -> None:
+    for words, expected in (
+        (["--version"], f"guided-lgp {__version__}"),
+        (["plan", "-h"], "--goal"),
+    ):
+        with pytest.raises(SystemExit) as ended:
+            cli.main(words)
+        assert ended.value.code in (0, None)
+        assert expected in capsys.readouterr().out
+
+
+def test_stages_stand_apart_from_what_users_need(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        cli.main(["--help"])
+    users, _, pipeline = capsys.readouterr().out.partition("pipeline \u2500")
+    assert all(stage in pipeline for stage in (*cli.STAGES, "mlflow"))
+    assert all(f" {command} " in users for command in ("plan", "view", "export", "doctor"))
+
+
+def test_a_plan_given_as_a_scene_says_so(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "plan.json").write_text('{"scene": {}, "actions": []}')
+    message = rejected(capsys, "plan", str(tmp_path / "plan.json"), "--goal", "(held red)")
+    assert "is a plan, not a scene" in message

@@ -93,7 +93,7 @@ def _cache() -> Finding:
 def _policy(name: str) -> Finding:
     title = f"Policy {name}"
     try:
-        load_policy(name)
+        load_policy(name, MODELS)
     except ImportError as error:
         return Finding(title, False, str(error), _INSTALL)
     except InputError as error:

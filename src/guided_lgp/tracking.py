@@ -103,6 +103,7 @@ def prepare() -> Any:
         An ``mlflow.MlflowClient``.
     """
     os.environ.setdefault("MLFLOW_ENABLE_ARTIFACTS_PROGRESS_BAR", "false")
+    os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
     import mlflow
 
     for noisy in ("alembic", "mlflow"):

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from guided_lgp import __version__
 from guided_lgp.cli import checks, dashboard, files, plan, stages
 from guided_lgp.cli.running import run_program
 
@@ -16,10 +17,21 @@ app = typer.Typer(
     epilog="Example: guided-lgp plan examples/three_boxes.json --goal '(on red green)'",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
 )
-for group in (checks, plan, files, stages):
+PIPELINE = "The paper's pipeline"
+"""The panel of the help that keeps its stages apart."""
+for group in (plan, files, checks, stages):
     app.add_typer(group.app)
-app.add_typer(dashboard.app, name="mlflow")
+for stage in stages.app.registered_commands:
+    stage.rich_help_panel = PIPELINE
+app.add_typer(dashboard.app, name="mlflow", rich_help_panel=PIPELINE)
+
+
+def _show_version(asked: bool) -> None:
+    if asked:
+        typer.echo(f"guided-lgp {__version__}")
+        raise typer.Exit
 
 
 @app.callback()
@@ -27,6 +39,16 @@ def _options(
     debug: Annotated[
         bool,
         typer.Option("--debug", help="Show the traceback of an error.", show_default="one line"),
+    ] = False,
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version",
+            help="Print the version.",
+            show_default="off",
+            callback=_show_version,
+            is_eager=True,
+        ),
     ] = False,
 ) -> None:
     """Declare for the help what :func:`run_program` acts on, wherever it stands."""

@@ -29,7 +29,7 @@ def mlflow_ui(
     from guided_lgp import tracking
 
     experiment = tracking.prepare().get_experiment_by_name(tracking.EXPERIMENT)
-    address = f"http://127.0.0.1:{port}/#/experiments/{experiment.experiment_id}"
+    address = f"http://127.0.0.1:{port}/#/experiments/{experiment.experiment_id}/runs"
     typer.echo(f"MLflow: {address} (Ctrl-C ends it)")
     command = [sys.executable, "-m", "mlflow", "server", "--host", "127.0.0.1"]
     command += ["--port", str(port), "--workers", "1"]

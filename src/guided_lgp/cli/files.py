@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from guided_lgp.documents import read_json
+from guided_lgp.cli.terminal import is_plan
 from guided_lgp.errors import InputError
 from guided_lgp.paths import EXAMPLES
 
@@ -106,7 +106,7 @@ def view(
     from guided_lgp.scene.validate import validate_scene
     from guided_lgp.view.live import view as serve
 
-    found = read_plan(file) if _is_plan(file) else None
+    found = read_plan(file) if is_plan(file) else None
     scene = found.scene if found else load_scene(file)
     validate_scene(scene, str(file))
     serve(
@@ -117,13 +117,3 @@ def view(
         skeleton=found.skeleton if found else (),
         objective=found.goals if found else (),
     )
-
-
-def _is_plan(file: Path) -> bool:
-    """Whether a file is a plan; what is not is left to the reader of scenes.
-
-    Raises:
-        InputError: the file is missing or is not JSON.
-    """
-    document = read_json(file, "a scene, or a plan written by plan --out")
-    return isinstance(document, dict) and "actions" in document

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from guided_lgp import __version__
-from guided_lgp.cli.terminal import AsJson, one_of, show, spinner
+from guided_lgp.cli.terminal import AsJson, is_plan, one_of, show, spinner
 from guided_lgp.errors import InputError
 from guided_lgp.paths import MODELS, PLANNING
 from guided_lgp.policy.registry import POLICIES
@@ -120,6 +120,10 @@ def plan(
     for file in filter(None, (out, html)):
         if not file.parent.is_dir():
             raise InputError(str(file), "its folder does not exist", "a file in an existing folder")
+    if is_plan(scene):
+        raise InputError(
+            str(scene), "is a plan, not a scene", "a scene; view and export take plans"
+        )
     start = load_scene(scene)
     objective = parse_objective(goal)
     with spinner("planning"):

@@ -1,6 +1,7 @@
 """Running a program: errors become one line and an exit code."""
 
 import logging
+import os
 import sys
 from collections.abc import Callable, Sequence
 from typing import NoReturn
@@ -23,12 +24,17 @@ def run_program(program: Callable[[list[str]], int | None], arguments: Sequence[
     logging.getLogger("guided_lgp").setLevel(logging.DEBUG if debug else logging.INFO)
     try:
         code = program([word for word in arguments if word != "--debug"])
+        sys.stdout.flush()
     except (InputError, TyperException) as error:
         _fail(error, 2, debug)
     except ModuleNotFoundError as error:
         _fail(_missing(error), 2, debug)
     except KeyboardInterrupt:
         sys.exit(130)
+    except BrokenPipeError:
+        # Who reads has seen enough; what is still buffered goes nowhere, without another error.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(0)
     except Exception as error:
         _fail(error, 3, debug)
     sys.exit(code)

@@ -8,6 +8,8 @@ from typing import Annotated
 
 import typer
 
+from guided_lgp.documents import read_json
+
 AsJson = Annotated[
     bool,
     typer.Option("--json", help="Write JSON to standard output.", show_default="text"),
@@ -54,3 +56,13 @@ def spinner(text: str) -> Iterator[None]:
 
     with Console(stderr=True).status(text):
         yield
+
+
+def is_plan(file: Path) -> bool:
+    """Whether a file is a plan; what is not is left to the reader of scenes.
+
+    Raises:
+        InputError: the file is missing or is not JSON.
+    """
+    document = read_json(file, "a scene, or a plan written by plan --out")
+    return isinstance(document, dict) and "actions" in document
