@@ -29,6 +29,23 @@ def test_sizes() -> None:
     assert sizes == [[41], [41, 43], [41, 43, 46]]
 
 
+def test_another_instruction_is_another_network() -> None:
+    """A hand-over adds a network, and a parameter that only it decides about."""
+    encoding = Encoding(domain="handover")
+    assert encoding.chains == {**ENCODING.chains, "take": ("gripper", "giver", "box")}
+    assert encoding.signature.decisions == ("instruction", "gripper", "box", "table", "giver")
+    assert encoding.input_names == ENCODING.input_names
+    assert encoding.chain_inputs("take") == [41, 43, 45]
+    symbols = load_domain("handover").symbols(
+        gripper=MANY.grippers, box=MANY.boxes[:3], table=MANY.surfaces[:2]
+    )
+    slots = encoding.fill((), ON_TABLES, symbols)
+    actions = ["(take pr2R pr2L green)", "(grasp pr2L blue)"]
+    classes = encoding.encode_actions(slots, map(Action.parse, actions))
+    assert classes == [(2, 1, 1, -1, 0), (0, 0, 2, -1, -1)]
+    assert Encoding.parse(encoding.document(), "x.json", "train_policy") == encoding
+
+
 @pytest.mark.parametrize(
     ("goals", "expected"),
     [

@@ -178,6 +178,27 @@ def test_torch_and_numpy_agree_and_know_the_applicable_actions(
         assert {tuple(row) for row in np.argwhere(applicable)} == allowed
 
 
+@pytest.mark.parametrize("seed", range(12))
+def test_heads_of_a_hand_over_apply_where_the_domain_says(seed: int) -> None:
+    problem = draw(boxes=4, tables=2, goals=3, seed=seed)
+    domain = load_domain("handover")
+    members = {"box": problem.symbols.boxes, "table": problem.symbols.surfaces}
+    symbols = domain.symbols(gripper=GRIPPERS, **members)
+    state = domain.state(dict(problem.state.support), dict(problem.state.held))
+    one = situation(problem.objective, state, problem.positions, symbols)
+    inputs = graphs(one, LIMITS)
+    found = {
+        (name, symbols.grippers[gripper], symbols.tables[table])
+        for name, head in heads(domain).items()
+        for gripper, table in np.argwhere(head.applicable(one, inputs)[0])
+    }
+    expected = {
+        (action.instruction, action.symbols[0], action.symbols[-1])
+        for action in applicable_actions(state, symbols)
+    }
+    assert found == expected
+
+
 def test_what_lies_outside_the_range_of_training_looks_like_its_border(
     policy: RelationalPolicy,
 ) -> None:
