@@ -17,9 +17,11 @@ import yaml
 from determinism import TIMING, differences
 from guided_lgp.cli import STAGES
 from guided_lgp.params import Params, load_params
+from guided_lgp.policy.paper.encoding import Encoding
 from guided_lgp.policy.registry import POLICIES
 
 ROOT = Path(__file__).parents[1]
+PARAMS = load_params(ROOT / "params.yaml")
 INFRASTRUCTURE = {"guided_lgp"} | {
     f"guided_lgp.{name}" for name in ("documents", "errors", "parallel", "params", "paths")
 }
@@ -92,7 +94,13 @@ def missing_sources(module: str, deps: list[str], unused: set[str]) -> list[str]
 
 def test_every_dependency_exists_or_is_made_by_a_stage() -> None:
     stages = pipeline()["stages"]
-    networks = stages["train_policy"]["matrix"]["network"]
+    networks = list(Encoding().chains)
+    for stage, settings in (
+        ("train_policy", PARAMS.train_policy),
+        ("train_improved", PARAMS.train_improved),
+    ):
+        assert stages[stage]["matrix"]["network"] == networks
+        assert list(settings.networks) == networks
     made = set()
     for stage in stages.values():
         for out in stage["outs"]:

@@ -114,14 +114,30 @@ class Network(Section):
 
 
 class TrainPolicy(Section):
-    """Training of the three networks (paper, Table IV)."""
+    """Training of the networks of a hierarchical policy (paper, Table IV).
+
+    The key of each network is its name: ``instruction``, and the instructions of the domain.
+    """
+
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, Network] = Field(init=False)
 
     seed: Seed
     validation_share: Annotated[float, Field(gt=0, lt=1), _NUMBER]
     patience: Count
-    instruction: Network
-    grasp: Network
-    place: Network
+
+    @property
+    def networks(self) -> dict[str, Network]:
+        """Architecture and optimiser of each network."""
+        return self.__pydantic_extra__
+
+    def with_dropout(self, dropout: float) -> "TrainPolicy":
+        """The same with another dropout in all networks."""
+        networks = {
+            name: network.model_copy(update={"dropout": dropout})
+            for name, network in self.networks.items()
+        }
+        return TrainPolicy.model_validate(self.model_dump() | networks)
 
 
 class TrainRelational(Section):
@@ -245,6 +261,10 @@ def _brief(value: object) -> str:
 def _accepted_keys(model: type[BaseModel], section: list[str]) -> list[str]:
     kind: Any = model
     for key in section:
-        # a mapping of names of one's own to sections, or a section with fields
-        kind = get_args(kind)[1] if get_origin(kind) is dict else kind.model_fields[key].annotation
+        # a mapping of names of one's own to sections, or a section with fields, or with both
+        if get_origin(kind) is not dict and key in kind.model_fields:
+            kind = kind.model_fields[key].annotation
+        else:
+            own = kind if get_origin(kind) is dict else kind.__annotations__["__pydantic_extra__"]
+            kind = get_args(own)[1]
     return list(getattr(kind, "model_fields", ()))

@@ -72,11 +72,8 @@ def _settings(case: Case, params: Params) -> TrainPolicy | TrainRelational:
     if case.patience is not None:
         settings = settings.model_copy(update={"patience": case.patience})
     if case.dropout is not None:
-        networks = {
-            network: getattr(settings, network).model_copy(update={"dropout": case.dropout})
-            for network in Encoding().chains
-        }
-        settings = settings.model_copy(update=networks)
+        assert isinstance(settings, TrainPolicy), "refused when the study is read"
+        settings = settings.with_dropout(case.dropout)
     return settings
 
 

@@ -83,6 +83,12 @@ def test_a_share_that_leaves_nothing_is_refused(world: Enumeration, tmp_path: Pa
         train_network("grasp", single, SETTINGS, ALONE, tmp_path)
 
 
+def test_networks_are_those_of_the_domain(dataset: Dataset) -> None:
+    settings = TrainPolicy.model_validate(SETTINGS.model_dump() | {"take": NETWORK.model_dump()})
+    with pytest.raises(InputError, match=r"has the networks .*take .*instruction, grasp, place"):
+        train_model("grasp", dataset, settings, "random")
+
+
 def test_training_for_studies_gives_the_same_networks(dataset: Dataset, tmp_path: Path) -> None:
     train_network("instruction", dataset, SETTINGS, ALONE, tmp_path / "pipeline")
     for split in ("random", "configuration"):

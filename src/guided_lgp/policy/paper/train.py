@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from guided_lgp.errors import InputError
 from guided_lgp.params import Network, Parallel, TrainPolicy
 from guided_lgp.policy import splits
 from guided_lgp.policy.arrays import BoolArray
@@ -89,12 +90,17 @@ def train_model(network: str, dataset: Dataset, settings: TrainPolicy, split: st
 def _trainings(
     network: str, dataset: Dataset, settings: TrainPolicy, split: str
 ) -> list[_Training]:
+    networks = list(dataset.encoding.chains)
+    if sorted(settings.networks) != sorted(networks):
+        found = ", ".join(settings.networks)
+        raise InputError(
+            "params.yaml: train_policy", f"has the networks {found}", ", ".join(networks)
+        )
     configuration = dataset.configuration[dataset.sample_state]
     validation = splits.held_out_samples(configuration, split, settings)
     samples = f"samples of the network {network}"
     held_out = validation[dataset.of_network(network)]
     splits.require_both_sides(held_out, "train_policy", samples, split)
-    number = list(dataset.encoding.chains).index(network)
     return [
         _Training(
             network=network,
@@ -102,16 +108,16 @@ def _trainings(
             split=split,
             dataset=dataset,
             validation=validation,
-            settings=getattr(settings, network),
+            settings=settings.networks[network],
             patience=settings.patience,
-            seed=np.random.SeedSequence([settings.seed, number, index]),
+            seed=np.random.SeedSequence([settings.seed, networks.index(network), index]),
         )
         for index, sub_policy in enumerate(dataset.encoding.chains[network])
     ]
 
 
 def _model(network: str, dataset: Dataset, settings: TrainPolicy, fits: Mapping[str, Fit]) -> Model:
-    own: Network = getattr(settings, network)
+    own = settings.networks[network]
     samples = len(dataset.of_network(network))
     return Model(
         network=network,
