@@ -2,10 +2,12 @@
 
 import inspect
 import json
+import textwrap
 from pathlib import Path
 
 import pytest
 
+import guided_lgp
 from guided_lgp import cli, load_scene, plan
 from guided_lgp.bounds.results import CoarseResult, Failure, PathResult
 from guided_lgp.domains import load_domain
@@ -89,7 +91,6 @@ def test_a_sequence_asked_twice_counts_once() -> None:
 @pytest.mark.parametrize(
     ("name", "goals", "nodes", "culprits"),
     [
-        ("impossible_reach", ["(on red shelf)"], 60, {"support red shelf", "reach"}),
         ("impossible_tower", ["(on red green)", "(on blue red)"], 400, {"reach", "collision"}),
         ("impossible_pair", ["(on wide1 small)", "(on wide2 small)"], 1000, {"support", "reach"}),
     ],
@@ -104,7 +105,7 @@ def test_impossible_tasks_name_the_action_the_constraint_and_the_amount(
     assert first.action.instruction == "place"
     assert f"(on {first.action.box} {first.action.table})" in goals
     assert any(first.constraint.startswith(culprit) for culprit in culprits)
-    assert first.violation > 0.001 or first.tried.startswith("proved")
+    assert first.violation > 0.001
     assert str(first) in result.explanation
     assert f"{result.coarse_calls} sequences with {result.solver_starts} starts" in (
         result.explanation
@@ -145,6 +146,15 @@ def test_the_readme_lists_every_scene() -> None:
     for file in EXAMPLES.glob("*.json"):
         assert f"`{file.name}`" in text
         assert json.loads(file.read_text())["name"] == file.stem.replace("_", "-")
+
+
+def test_the_docstring_of_the_package_runs(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(ROOT)
+    _, example = (guided_lgp.__doc__ or "").split("::\n", 1)
+    exec(textwrap.dedent(example))
+    assert "grasp" in capsys.readouterr().out
 
 
 def test_unknown_names() -> None:

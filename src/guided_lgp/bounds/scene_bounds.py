@@ -3,6 +3,7 @@
 from functools import cached_property
 
 from guided_lgp.bounds.coarse import CoarseBound, check_terms
+from guided_lgp.bounds.coarse.facts import Facts
 from guided_lgp.bounds.path import PathBound, check_motions
 from guided_lgp.bounds.results import CoarseResult, PathResult
 from guided_lgp.logic import Skeleton
@@ -26,6 +27,11 @@ class SceneBounds:
         self._path_solutions = params.path_solutions
         self._coarse: dict[Skeleton, CoarseResult] = {}
         self._path: dict[Skeleton, PathResult] = {}
+
+    @property
+    def facts(self) -> Facts:
+        """What single arms cannot do in the scene."""
+        return self._coarse_bound.facts
 
     def coarse(self, skeleton: Skeleton) -> CoarseResult:
         """One verified configuration per action, or why there is none."""

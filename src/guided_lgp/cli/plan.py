@@ -18,10 +18,13 @@ from guided_lgp.search.planners import SEARCHES
 app = typer.Typer()
 
 _HINTS: Mapping[str | None, str] = {
-    "attempts": "--planner best-first goes on after the last attempt",
+    "attempts": "--planner complete goes on after the last attempt",
     "stopped": "--max-nodes raises the limit",
+    "coarse": "max_sequences in the file of --params raises the limit",
+    "paths": "max_paths in the file of --params raises the limit",
+    "max_seconds": "--timeout raises the limit",
 }
-"""What a user can do about the reason for which a search ended."""
+"""What a user can do about the limit at which a search ended."""
 
 
 @app.command()
@@ -46,7 +49,7 @@ def plan(
             + "; ".join(f"{name}: {search.summary}" for name, search in SEARCHES.items())
             + ".",
         ),
-    ] = "guided",
+    ] = "complete",
     policy: Annotated[
         str,
         typer.Option(
@@ -58,9 +61,23 @@ def plan(
         ),
     ] = "relational",
     max_nodes: Annotated[
-        int,
-        typer.Option(min=1, metavar="N", help="Give up when the search tree has N nodes."),
-    ] = 5000,
+        int | None,
+        typer.Option(
+            min=1,
+            metavar="N",
+            help="Give up when the search tree has N nodes.",
+            show_default="the limit in --params",
+        ),
+    ] = None,
+    timeout: Annotated[
+        float | None,
+        typer.Option(
+            min=0.001,
+            metavar="SECONDS",
+            help="Give up after so many seconds.",
+            show_default="no limit of time",
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -135,6 +152,7 @@ def plan(
             models=models,
             params=load_planning(params),
             max_nodes=max_nodes,
+            timeout=timeout,
             where=str(scene),
         )
     followed = SEARCHES[planner].follows_policy
@@ -159,6 +177,9 @@ def plan(
         "statistics": statistics,
     }
     path = result.path
+    if path is not None and not path.skeleton:
+        typer.echo(json.dumps(summary, indent=1) if as_json else "the goals hold already")
+        return
     if path is None or path.trajectory is None:
         if as_json:
             typer.echo(json.dumps(summary, indent=1))

@@ -226,10 +226,10 @@ def parse_scene(document: object, where: str) -> Scene:
         raise InputError(f"{where}: {field}" if field else where, first["msg"]) from None
 
 
-def load_scene(path: Path) -> Scene:
+def load_scene(path: str | Path) -> Scene:
     """Read a scene from a JSON file.
 
     Raises:
         InputError: the file is missing, is not JSON, or is not a scene.
     """
-    return parse_scene(read_json(path), str(path))
+    return parse_scene(read_json(Path(path)), str(path))

@@ -15,16 +15,20 @@ def plan(problem: Problem) -> SearchResult:
     ran to the maximum depth, where the policy would go in the same circles again. From then on
     neither they nor states passed in the attempt itself are entered, unless nothing else is left.
     """
-    tree = SkeletonTree(problem)
+    return search(SkeletonTree(problem), problem.limits.max_depth)
+
+
+def search(tree: SkeletonTree, max_depth: int) -> SearchResult:
+    """See :func:`plan`; attempts end at a depth of their own."""
     unexplored = [tree.root]
     excluded: set[State] = set()
-    for _ in range(1 + problem.limits.reattempts):
+    for _ in range(1 + tree.problem.limits.reattempts):
         if not unexplored:
             return tree.result("exhausted")
         if limit := tree.limit_reached():
             return tree.result(limit)
         node = _take_most_probable(unexplored, excluded)
-        cause = _attempt(node, tree, unexplored, excluded)
+        cause = _attempt(node, tree, unexplored, excluded, max_depth)
         if cause is None:
             return tree.result()
         tree.run.attempt_failed(cause)
@@ -32,7 +36,7 @@ def plan(problem: Problem) -> SearchResult:
 
 
 def _attempt(
-    node: Node, tree: SkeletonTree, unexplored: list[Node], excluded: set[State]
+    node: Node, tree: SkeletonTree, unexplored: list[Node], excluded: set[State], max_depth: int
 ) -> Cause | None:
     """Extend a node greedily; None if a verified path satisfies the objective."""
     passed: set[State] = set()
@@ -43,7 +47,9 @@ def _attempt(
         if tree.satisfied(node):
             return None if tree.run.solve(node.skeleton) else "infeasible"
         passed.add(node.state)
-        if len(node.skeleton) >= tree.problem.limits.max_depth:
+        if tree.run.expired:
+            return "max_seconds"
+        if len(node.skeleton) >= max_depth:
             excluded |= passed
             return "max_depth"
         children = tree.expand(node, configuration)

@@ -34,6 +34,9 @@ class Search:
 
 
 SEARCHES: Mapping[str, Search] = {
+    "complete": Search(
+        "complete:plan", "guided first, best-first where that fails", follows_policy=True
+    ),
     "guided": Search("guided:plan", "follow the policy, as in the paper", follows_policy=True),
     "best-first": Search(
         "best_first:plan",

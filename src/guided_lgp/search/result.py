@@ -9,19 +9,21 @@ from guided_lgp.bounds.results import Array, CoarseResult, Failure, PathResult
 from guided_lgp.logic import Action, Objective, Skeleton, State, Symbols, format_skeleton
 from guided_lgp.search.problem import Problem
 
-Cause = Literal["infeasible", "max_depth"]
-"""Why an attempt of the guided search ended (paper, Table I)."""
+Cause = Literal["infeasible", "max_depth", "max_seconds"]
+"""Why an attempt of the guided search ended; the first two as in the paper (Table I)."""
 
-Reason = Literal["stopped", "coarse", "paths", "exhausted", "attempts"]
-"""Why a search ended without a plan: limit of nodes or of either bound, nothing left to expand, or
-no reattempt left."""
+Reason = Literal["stopped", "coarse", "paths", "max_seconds", "exhausted", "attempts", "impossible"]
+"""Why a search ended without a plan: limit of nodes, of either bound or of time, nothing left to
+expand, no reattempt left, or a goal that was known to be out of reach before any search."""
 
 REASONS: Mapping[Reason, str] = {
     "stopped": "stopped at the limit of the tree size",
     "coarse": "stopped at the limit of sequences for the coarse bound",
     "paths": "stopped at the limit of sequences without a path",
+    "max_seconds": "stopped at the limit of time",
     "exhausted": "every sequence within the depth limit is infeasible",
     "attempts": "the last allowed attempt failed",
+    "impossible": "a goal is out of reach",
 }
 """In words."""
 
@@ -164,6 +166,12 @@ class Run:
         self._policy_calls += 1
         return scores
 
+    @property
+    def expired(self) -> bool:
+        """Whether the time is up."""
+        allowed = self._limits.max_seconds
+        return allowed is not None and time.perf_counter() - self._start >= allowed
+
     def limit_reached(self, tree_size: int) -> Reason | None:
         """The limit that ends the search, if one is reached."""
         limits = self._limits
@@ -171,6 +179,8 @@ class Run:
             return "paths"
         if len(self._asked) >= limits.max_sequences:
             return "coarse"
+        if self.expired:
+            return "max_seconds"
         return "stopped" if tree_size >= limits.max_tree_size else None
 
     def attempt_failed(self, cause: Cause) -> None:

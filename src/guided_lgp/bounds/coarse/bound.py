@@ -42,7 +42,7 @@ class CoarseBound:
         self._restarts = restarts
         self._solver = solver or default_solver(scene.robot.description)
         self._geometry = SceneGeometry(scene)
-        self._facts = Facts(self._geometry)
+        self.facts = Facts(self._geometry)
         self._starts = Starts(self._geometry, self._solver)
         self._decoder = Decoder(self._geometry)
         self._settings = Settings()
@@ -88,7 +88,7 @@ class CoarseBound:
 
     def _search(self, skeleton: Skeleton, prefix: CoarseSolution | None) -> CoarseSolution:
         """Start after start until one leads to a verified solution, unless a fact forbids it."""
-        if fact := self._facts.impossible(skeleton):
+        if fact := self.facts.impossible(skeleton):
             failure = Failure(len(skeleton) - 1, str(fact), np.nan, _PROVED)
             return CoarseSolution(skeleton, feasible=False, failure=failure, restarts=0)
         programs = _Programs(self._geometry, skeleton)

@@ -32,6 +32,8 @@ class Hold:
     support: str | None
     """Where the box is: anywhere on a support at its start, or (None) at its own start."""
     lines: tuple[Line, ...]
+    loaded: bool = False
+    """Whether the box may carry others: then their common centre is on the support, not its own."""
 
     def __str__(self) -> str:
         return f"reach {self.gripper} {self.box}"
@@ -58,20 +60,32 @@ class Facts:
             self._known[hold] = limb is not None and limb.cannot(self._grasp(hold))
         return self._known[hold]
 
+    def never(self, ground: GroundInstruction) -> bool:
+        """Whether a body cannot be put on furniture, whatever has happened before."""
+        return any(map(self.out_of_reach, self._held(ground, ground.parent, loaded=True)))
+
     def _holds(self, skeleton: Skeleton) -> Iterator[Hold]:
         """What the last action asks of its arms, where it is known where its body stands."""
         *before, last = map(self._geometry.scene.symbols.domain.bind, skeleton)
         moved, loaded = self._moved(before, last.body)
-        if last.parent in self._arms:
-            support, known = moved.get(last.body), moved.get(last.body, "") is not None
-        else:
-            support, known = last.parent, not loaded and last.parent not in moved
-        for term in last.contact if known else ():
-            if term.name == "hold" and term.symbols[1] == last.body:
+        if last.parent not in self._arms:
+            if last.parent not in moved:
+                yield from self._held(last, last.parent, loaded)
+        elif last.body not in moved:
+            yield from self._held(last, None)
+        elif (support := moved[last.body]) is not None:
+            yield from self._held(last, support)
+
+    def _held(
+        self, ground: GroundInstruction, support: str | None, loaded: bool = False
+    ) -> Iterator[Hold]:
+        """What an action asks of each arm that holds its body at the contact."""
+        for term in ground.contact:
+            if term.name == "hold" and term.symbols[1] == ground.body:
                 gripper = term.symbols[0]
-                lines = straight_lines(last.motion)
+                lines = straight_lines(ground.motion)
                 own = tuple(line for line in lines if line.gripper == gripper)
-                yield Hold(gripper, last.body, support, own)
+                yield Hold(gripper, ground.body, support, own, loaded)
 
     def _moved(
         self, before: Sequence[GroundInstruction], body: str
@@ -119,7 +133,9 @@ class Facts:
             return place, place, z
         hx, hy, hz = self._geometry.bodies[hold.support].half
         cosine, sine = abs(np.cos(yaw)), abs(np.sin(yaw))
-        half = np.array([cosine * hx + sine * hy, sine * hx + cosine * hy, np.pi / 2])
-        # turned by half a turn, the same grasps come from the box's other end
+        own = self._geometry.bodies[hold.box].half
+        beyond = np.hypot(*own[:2]) if hold.loaded else 0.0
+        half = np.array([cosine * hx + sine * hy + beyond, sine * hx + cosine * hy + beyond, 0.0])
+        half[2] = np.pi / 2  # turned by half a turn, the same grasps come from the box's other end
         centre = np.array([x, y, 0.0])
-        return centre - half, centre + half, z + hz + self._geometry.bodies[hold.box].half[2]
+        return centre - half, centre + half, z + hz + own[2]

@@ -25,8 +25,8 @@ _SLACK_ANGLE = 0.02
 """Tolerance of joint limits (rad)."""
 _SMALLEST = 0.004
 """Cells whose wrist moves by less (m) are not divided: the solver decides."""
-_LARGEST_EFFORT = 100_000
-"""Cells looked at before the proof is given up."""
+_EFFORT = 50_000
+"""Cells looked at before the proof is given up, for each variable that is free."""
 _TURNED_OVER = [0, 2, 4, 6]
 """The joints that turn about x or z."""
 
@@ -104,14 +104,14 @@ class Limb:
         ]
         cells = np.stack([grid.ravel() for grid in np.meshgrid(*axes, indexing="ij")], axis=-1)
         half = (grasp.high - grasp.low) / counts / 2
-        effort = 0
+        effort, allowed = 0, _EFFORT * np.count_nonzero(half)
         while len(cells):
             effort += len(cells)
             cells = cells[self._open(grasp, cells, half)]
             if self._open(grasp, cells, np.zeros(6)).any():
                 return False
             moved = half * self._levers(grasp)
-            if moved.sum() < _SMALLEST or effort > _LARGEST_EFFORT:
+            if moved.sum() < _SMALLEST or effort > allowed:
                 return len(cells) == 0
             for axis in np.flatnonzero(moved >= 0.6 * moved.max()):
                 half = np.where(np.arange(6) == axis, half / 2, half)
