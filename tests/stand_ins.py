@@ -16,11 +16,11 @@ class NothingOnBlue:
         self._keyframe = start(scene)
 
     def coarse(self, skeleton: Skeleton) -> CoarseResult:
-        if any(action.table == "blue" for action in skeleton):
+        if any(action.symbols[2:] == ("blue",) for action in skeleton):
             return CoarseResult(skeleton, False, failure=FAILURE, time_s=0.5)
         frames = (self._keyframe,) * len(skeleton)
         return CoarseResult(skeleton, True, frames, frames, time_s=0.5)
 
     def path(self, skeleton: Skeleton) -> PathResult:
-        feasible = all(action.table != "green" for action in skeleton)
+        feasible = all(action.symbols[2:] != ("green",) for action in skeleton)
         return PathResult(skeleton, feasible, failure=None if feasible else FAILURE, time_s=2.0)

@@ -33,7 +33,7 @@ class OneHand:
         self._keyframe = start(scene)
 
     def coarse(self, skeleton: Skeleton) -> CoarseResult:
-        if skeleton[-1].gripper == "pr2L":
+        if skeleton[-1].symbols[0] == "pr2L":
             failure = Failure(len(skeleton) - 1, "reach", float("nan"), "scripted")
             return CoarseResult(skeleton, False, failure=failure)
         frames = (self._keyframe,) * len(skeleton)

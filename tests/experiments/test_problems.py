@@ -57,9 +57,9 @@ def test_objectives_spelled_out() -> None:
     assert format_objective(towers[0]) == (
         "(on red green) (on green blue) (on blue yellow) (on yellow purple) (on purple tray)"
     )
-    assert {tower[0].box for tower in towers} == set(boxes)  # every box is at the top once
+    assert {tower[0].symbols[0] for tower in towers} == set(boxes)  # every box is at the top once
     for objective in problems["d.1"].objectives(boxes):
-        assert [goal.table for goal in objective].count("tray") == 2
+        assert [goal.symbols[1] for goal in objective].count("tray") == 2
 
 
 def test_objectives_for_many_boxes() -> None:
@@ -76,4 +76,4 @@ def test_objectives_for_many_boxes() -> None:
     ]
     ten = generate("e10", 1, 0, "x").scenes[0].symbols.boxes
     for objective in problems["e.10"].objectives(ten):
-        assert {goal.box for goal in objective} == set(ten)
+        assert {goal.symbols[0] for goal in objective} == set(ten)

@@ -39,14 +39,15 @@ class Sensible:
         actions: Sequence[Action],
     ) -> Array:
         goals = [goal for goal in objective if not state.satisfies(goal)]
-        waiting = {goal.box for goal in goals}
+        waiting = {goal.symbols[0] for goal in goals}
         scores = np.zeros(len(actions))
         for row, action in enumerate(actions):
             for goal in goals:
-                if action.box == goal.box and action.table == goal.table:
-                    scores[row] = 5.0 - 2.0 * (action.table in waiting)
-                elif action.box == goal.box and action.instruction == "grasp":
-                    scores[row] = 3.0 - 2.0 * (goal.table in waiting)
+                under = not waiting.isdisjoint(goal.symbols[1:])
+                if action.symbols[1:] == goal.symbols:
+                    scores[row] = 5.0 - 2.0 * under
+                elif action.symbols[1] == goal.symbols[0] and action.instruction == "grasp":
+                    scores[row] = 3.0 - 2.0 * under
         return scores - np.log(np.exp(scores).sum())
 
 
@@ -85,7 +86,7 @@ def test_generalization(params: Params, monkeypatch: pytest.MonkeyPatch) -> None
     by_text = {format_objective(objective): objective for objective in objectives}
     for row in rows:
         objective = by_text[row["objective"]]
-        tables = {goal.table for goal in objective}
+        tables = {name for goal in objective for name in goal.symbols[1:]}
         if satisfied(scene.state, objective):
             assert row["outcome"] == "trivial"
         elif "blue" in tables:

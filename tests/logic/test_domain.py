@@ -45,7 +45,7 @@ def test_what_stands_on_a_box_moves_with_it() -> None:
 def test_no_place_on_what_stands_on_the_box() -> None:
     tower = load_domain().state({"red": "tab1", "green": "red", "blue": "green"})
     state = progress(tower, parse_skeleton("(grasp pr2L red)"))
-    places = [a.table for a in applicable_actions(state, SETUP_A) if a.instruction == "place"]
+    places = [a.symbols[2] for a in applicable_actions(state, SETUP_A) if a.instruction == "place"]
     assert places == ["tab1", "tab2"]
 
 

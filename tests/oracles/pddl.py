@@ -55,10 +55,7 @@ def initial_facts(state: State, symbols: Symbols) -> list[list[str]]:
 
 def goal_facts(objective: Objective) -> list[list[str]]:
     """What an objective asks for."""
-    return [
-        ["carried", goal.box] if goal.table is None else ["on", goal.box, goal.table]
-        for goal in objective
-    ]
+    return [["carried" if goal.kind == "held" else "on", *goal.symbols] for goal in objective]
 
 
 def problem(state: State, objective: Objective, symbols: Symbols) -> str:
@@ -75,17 +72,18 @@ def problem(state: State, objective: Objective, symbols: Symbols) -> str:
 
 def step(state: State, action: Action, symbols: Symbols) -> str:
     """The ground PDDL action of an action in a state."""
-    if action.table is None:
-        words = ["take", action.gripper, action.box, str(state.support_of(action.box))]
-    elif action.table in symbols.surfaces:
-        words = ["put-surface", action.gripper, action.box, action.table]
+    gripper, box, *support = action.symbols
+    if not support:
+        words = ["take", gripper, box, str(state.support_of(box))]
+    elif support[0] in symbols.surfaces:
+        words = ["put-surface", gripper, box, support[0]]
     else:
-        chain = [action.table]
+        chain = support
         while (below := state.support_of(chain[-1])) in symbols.boxes:
             chain.append(str(below))
         end = "hand" if below is None else "surface"
         bottom = below or str(state.holder(chain[-1]))
-        words = [f"put-{len(chain)}-{end}", action.gripper, action.box, *chain, bottom]
+        words = [f"put-{len(chain)}-{end}", gripper, box, *chain, bottom]
     return f"({' '.join(words)})".lower()
 
 

@@ -51,10 +51,11 @@ def positions_along(scene: Scene, skeleton: Skeleton) -> list[dict[str, Array]]:
     for action in (None, *skeleton):
         if action is not None:
             state = successor(state, action)
-            if action.table is not None:
-                below = boxes.get(action.table, fixed.get(action.table))
-                above = 0.1 if action.table in boxes else 0.05
-                boxes[action.box] = np.add(below, (0, 0, above))
+            _, placed, *support = action.symbols
+            if support:
+                below = boxes.get(support[0], fixed.get(support[0]))
+                above = 0.1 if support[0] in boxes else 0.05
+                boxes[placed] = np.add(below, (0, 0, above))
             for box, gripper in state.held:
                 boxes[box] = np.add(fixed[gripper], (0.1, 0, 0))
         grippers, tables = ({name: fixed[name] for name in part} for part in (GRIPPERS, TABLES))

@@ -12,7 +12,7 @@ TOWER = parse_objective(["(on red green)", "(on green blue)"])
 
 
 def left_hand_fails(skeleton: Skeleton) -> bool:
-    return skeleton[-1].gripper == "pr2R"
+    return skeleton[-1].symbols[0] == "pr2R"
 
 
 def test_a_uniform_policy_solves_four_actions(scene: Scene) -> None:
@@ -27,7 +27,7 @@ def test_a_uniform_policy_solves_four_actions(scene: Scene) -> None:
 
 
 def test_finds_what_breadth_first_finds(scene: Scene, limits: SearchLimits) -> None:
-    misled = Scorer(lambda objective, state, action: -5.0 * (action.gripper == "pr2R"))
+    misled = Scorer(lambda objective, state, action: -5.0 * (action.symbols[0] == "pr2R"))
     objective = parse_objective(["(on red tab2)", "(held blue)"])
     limits = limits.model_copy(update={"max_depth": 3})
     plans = [
@@ -69,7 +69,7 @@ def test_same_search_twice(scene: Scene, limits: SearchLimits) -> None:
 
 def test_a_policy_that_goes_in_circles(scene: Scene) -> None:
     """It loves to move green to and fro; the search still turns to red soon."""
-    circles = Scorer(lambda objective, state, action: 6.0 * (action.box == "green"))
+    circles = Scorer(lambda objective, state, action: 6.0 * (action.symbols[1] == "green"))
     limits = SearchLimits(
         max_depth=20, reattempts=0, max_tree_size=400_000, max_paths=1000, max_sequences=1000
     )
@@ -98,9 +98,9 @@ def test_takes_the_detour_that_geometry_asks_for(scene: Scene, limits: SearchLim
 
     def reaches(skeleton: Skeleton) -> bool:
         action = skeleton[-1]
-        if action.gripper == "pr2L":
-            return action.table != "green"
-        moved = any(before.table == "tab2" for before in skeleton[:-1])
+        if action.symbols[0] == "pr2L":
+            return action.symbols[2:] != ("green",)
+        moved = any(before.symbols[2:] == ("tab2",) for before in skeleton[:-1])
         return action.instruction == "place" or moved
 
     bounds = ScriptedBounds(scene, reaches)

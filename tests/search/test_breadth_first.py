@@ -28,14 +28,14 @@ def test_first_feasible_sequence_in_order(scene: Scene) -> None:
 def test_infeasible_sequences_are_passed_over(scene: Scene) -> None:
     bounds = ScriptedBounds(
         scene,
-        coarse=lambda skeleton: skeleton[-1].gripper == "pr2R",
+        coarse=lambda skeleton: skeleton[-1].symbols[0] == "pr2R",
         path=lambda skeleton: len(skeleton) > 2,
     )
     objective = parse_objective(["(on red tab2)"])
     result = breadth_first.plan(Problem(scene, objective, LIMITS, bounds))
     assert result.skeleton is not None
     assert len(result.skeleton) == 3  # the tree goes on below a rejected sequence
-    assert {action.gripper for action in result.skeleton} == {"pr2R"}
+    assert {action.symbols[0] for action in result.skeleton} == {"pr2R"}
 
 
 def test_tower_is_found_in_the_fourth_level(scene: Scene) -> None:

@@ -21,12 +21,10 @@ from guided_lgp.search.enumerate import enumerate_sequences
 
 def reachable(skeleton: Skeleton) -> bool:
     """The left hand reaches neither tab2 nor green, and nothing can stand on blue."""
-    last = skeleton[-1]
-    left = last.gripper == "pr2L"
+    gripper, box, *support = skeleton[-1].symbols
+    left = gripper == "pr2L"
     return (
-        not (left and last.table == "tab2")
-        and not (left and last.box == "green")
-        and (last.table != "blue")
+        not (left and support == ["tab2"]) and not (left and box == "green") and support != ["blue"]
     )
 
 

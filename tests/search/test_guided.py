@@ -48,7 +48,7 @@ def test_reattempt_after_an_infeasible_step(scene: Scene, limits: SearchLimits) 
     likes = {"(grasp pr2L red)": 3.0, "(grasp pr2R red)": 2.0}
     likes |= {"(place pr2L red tab2)": 3.0, "(place pr2R red tab2)": 3.0}
     policy = Scorer(lambda objective, state, action: likes.get(str(action), 0.0))
-    bounds = ScriptedBounds(scene, coarse=lambda skeleton: skeleton[-1].gripper == "pr2R")
+    bounds = ScriptedBounds(scene, coarse=lambda skeleton: skeleton[-1].symbols[0] == "pr2R")
     result = guided.plan(Problem(scene, objective, limits, bounds, policy))
     assert result.skeleton == parse_skeleton("(grasp pr2R red) (place pr2R red tab2)")
     assert result.causes == ("infeasible",)
@@ -60,7 +60,7 @@ def test_reattempt_after_an_infeasible_path(scene: Scene, limits: SearchLimits) 
     objective = parse_objective(["(held red)"])
     likes = {"(grasp pr2L red)": 3.0, "(grasp pr2R red)": 2.0}
     policy = Scorer(lambda objective, state, action: likes.get(str(action), 0.0))
-    bounds = ScriptedBounds(scene, path=lambda skeleton: skeleton[0].gripper == "pr2R")
+    bounds = ScriptedBounds(scene, path=lambda skeleton: skeleton[0].symbols[0] == "pr2R")
     result = guided.plan(Problem(scene, objective, limits, bounds, policy))
     assert result.skeleton == parse_skeleton("(grasp pr2R red)")
     assert result.causes == ("infeasible",)
@@ -68,7 +68,7 @@ def test_reattempt_after_an_infeasible_path(scene: Scene, limits: SearchLimits) 
 
 
 def test_maximum_depth_ends_attempts(scene: Scene) -> None:
-    never = Scorer(lambda objective, state, action: -9.0 * (action.box == "red"))
+    never = Scorer(lambda objective, state, action: -9.0 * (action.symbols[1] == "red"))
     limits = SearchLimits(
         max_depth=3, reattempts=2, max_tree_size=20_000, max_paths=1000, max_sequences=1000
     )
@@ -119,7 +119,8 @@ def test_a_reattempt_leaves_the_circle(scene: Scene) -> None:
     """The policy loves to move green to and fro, and then to move red."""
     circles = Scorer(
         lambda objective, state, action: (
-            {"green": 6.0, "red": 3.0}.get(action.box, 0.0) + 2.0 * (action.table == "tab2")
+            {"green": 6.0, "red": 3.0}.get(action.symbols[1], 0.0)
+            + 2.0 * (action.symbols[2:] == ("tab2",))
         )
     )
     limits = SearchLimits(

@@ -46,13 +46,13 @@ def test_next_sequence_when_the_first_fails(plan: Planner, scene: Scene) -> None
     """Only the right hand reaches, and only sequences of six actions have a path."""
     bounds = ScriptedBounds(
         scene,
-        coarse=lambda skeleton: skeleton[-1].gripper == "pr2R",
+        coarse=lambda skeleton: skeleton[-1].symbols[0] == "pr2R",
         path=lambda skeleton: len(skeleton) == 6,
     )
     result = plan(Problem(scene, TOWER, LIMITS, bounds))
     assert result.skeleton is not None
     assert len(result.skeleton) == 6
-    assert {action.gripper for action in result.skeleton} == {"pr2R"}
+    assert {action.symbols[0] for action in result.skeleton} == {"pr2R"}
     lengths = [len(skeleton) for skeleton in bounds.path_asked]
     assert lengths == sorted(lengths)
     assert len(set(bounds.path_asked)) == len(lengths)

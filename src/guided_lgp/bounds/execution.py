@@ -15,7 +15,7 @@ from guided_lgp.bounds.checks import Violation, box_sizes
 from guided_lgp.bounds.results import Array, Trajectory
 from guided_lgp.bounds.verify.geometry import grasp_faults
 from guided_lgp.bounds.verify.path import switches_of
-from guided_lgp.logic import Goal, Objective, Skeleton, successor
+from guided_lgp.logic import GroundAtom, Objective, Skeleton, State, successor
 from guided_lgp.poses import compose, inverse
 from guided_lgp.scene import Scene
 from guided_lgp.scene.bullet import pybullet
@@ -84,7 +84,10 @@ def execute(
                 run.release(gripper, box)
         run.follow(float(trajectory.times[-1]))
         run.rest()
-        goals = {str(goal): run.holds(goal) for goal in objective}
+        goals = {
+            str(goal): all(run.holds(atom, state) for atom in state.domain.conditions(goal))
+            for goal in objective
+        }
         drift = run.drift(planned)
     return PhysicsReport(all(goals.values()), goals, drift)
 
@@ -197,17 +200,34 @@ class _Execution:
         constraint, _ = self._grips.pop((gripper, box))
         pybullet.removeConstraint(constraint, physicsClientId=self._client)
 
-    def holds(self, goal: Goal) -> bool:
-        """Whether a goal holds: held in a hand, or at rest upon a table and not held."""
-        for (gripper, held), (_, grip) in self._grips.items():
-            if held == goal.box:
-                slip = compose(self._tool(gripper), grip)[:3] - self._box(held)[:3]
-                return goal.kind == "held" and bool(np.linalg.norm(slip) < HELD_SLACK)
-        if goal.kind == "held" or goal.table is None:
+    def holds(self, atom: GroundAtom, state: State) -> bool:
+        """Whether a condition of a goal holds; what no contact shows, the state tells."""
+        match atom.predicate, atom.symbols:
+            case "held", (box,):
+                seen = any(self._in_hand(gripper, box) for gripper, _ in self._grips)
+            case "holds", (gripper, box):
+                seen = self._in_hand(gripper, box)
+            case "on", (box, support):
+                seen = self._rests(box, support)
+            case _:
+                return atom.holds_in(state)
+        return seen != atom.negated
+
+    def _in_hand(self, gripper: str, box: str) -> bool:
+        """Whether a gripper holds a box that has not slipped."""
+        if (gripper, box) not in self._grips:
             return False
-        box, table = self._world.boxes[goal.box], self._body(goal.table)
-        contacts = pybullet.getContactPoints(box, table, physicsClientId=self._client)
-        # The normal points from the table to the box.
+        _, grip = self._grips[gripper, box]
+        slip = compose(self._tool(gripper), grip)[:3] - self._box(box)[:3]
+        return bool(np.linalg.norm(slip) < HELD_SLACK)
+
+    def _rests(self, box: str, support: str) -> bool:
+        """Whether a box that nothing holds is at rest upon a support."""
+        if any(held == box for _, held in self._grips):
+            return False
+        upper, lower = self._world.boxes[box], self._body(support)
+        contacts = pybullet.getContactPoints(upper, lower, physicsClientId=self._client)
+        # The normal points from the support to the box.
         return bool(contacts) and all(contact[7][2] > UPRIGHT for contact in contacts)
 
     def drift(self, planned: Mapping[str, Array]) -> float:

@@ -15,13 +15,14 @@ from guided_lgp.logic.objectives import (
     validate_objective,
 )
 from guided_lgp.logic.progression import applicable_actions, progress, successor
-from guided_lgp.logic.state import State
+from guided_lgp.logic.state import GroundAtom, State
 from guided_lgp.logic.symbols import Symbols
 
 __all__ = [
     "Action",
     "Domain",
     "Goal",
+    "GroundAtom",
     "GroundInstruction",
     "GroundTerm",
     "Objective",

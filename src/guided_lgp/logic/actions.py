@@ -26,21 +26,6 @@ class Action:
         """
         return cls(*_words(text, "action", "(instruction symbol ...)"))
 
-    @property
-    def gripper(self) -> str:
-        """The gripper of a grasp or place."""
-        return self.symbols[0]
-
-    @property
-    def box(self) -> str:
-        """The box of a grasp or place."""
-        return self.symbols[1]
-
-    @property
-    def table(self) -> str | None:
-        """What a place puts the box on."""
-        return self.symbols[2] if len(self.symbols) > 2 else None
-
 
 @dataclass(frozen=True, order=True)
 class Goal:
@@ -60,16 +45,6 @@ class Goal:
             InputError: the text has another form.
         """
         return cls(*_words(text, "goal", "(goal-type symbol ...)"))
-
-    @property
-    def box(self) -> str:
-        """The box of a goal."""
-        return self.symbols[0]
-
-    @property
-    def table(self) -> str | None:
-        """What the box of a goal is to stand on."""
-        return self.symbols[1] if len(self.symbols) > 1 else None
 
 
 Skeleton = tuple[Action, ...]

@@ -36,8 +36,8 @@ def objective_kind(objective: str, boxes: Collection[str]) -> str:
     kinds = []
     for text in re.findall(r"\([^()]*\)", objective):
         goal = Goal.parse(text)
-        support = "box" if goal.table in boxes else "table"
-        kinds.append("held" if goal.kind == "held" else f"on {support}")
+        others = ("box" if name in boxes else "table" for name in goal.symbols[1:])
+        kinds.append(" ".join((goal.kind, *others)))
     return " + ".join(sorted(kinds))
 
 
@@ -155,11 +155,11 @@ def by_last_action(verdicts: pd.DataFrame, scenes: Mapping[str, Scene]) -> pd.Da
             state = progress(scene.state, parse_skeleton(prefix))
             before[configuration, prefix] = state
         (action,) = parse_skeleton(skeleton[start:])
-        table = action.table or state.support_of(action.box)
-        assert table is not None
+        ground = scene.symbols.domain.bind(action)
+        table = state.parent_of(ground.body) if ground.into_hand else ground.parent
         if table in scene.symbols.boxes:
             table = BOX if state.holder(table) is None else HELD_BOX
-        rows.append((action.instruction, action.gripper, table, feasible))
+        rows.append((action.instruction, ground.actor, table, feasible))
     frame = pd.DataFrame(rows, columns=["instruction", "gripper", "table", "feasible"])
     groups = frame.groupby(["instruction", "gripper", "table"])["feasible"]
     return pd.DataFrame({"n": groups.size(), "feasible": groups.sum()}).reset_index()

@@ -53,14 +53,15 @@ def features(
         positions: world position (3,) in m of every symbol.
         action: the action.
     """
-    side = float(sides(len(symbols.grippers))[symbols.grippers.index(action.symbols[0])])
-    target = action.table or action.box
+    ground = state.domain.bind(action)
+    side = float(sides(len(symbols.grippers))[symbols.grippers.index(ground.actor)])
+    target = ground.body if ground.into_hand else ground.parent
     standing = state.standing_on(target)
     x, y, z = positions[target].tolist()
     dx = sum(float(positions[box][0]) - x for box in standing) / max(len(standing), 1)
     dy = sum(float(positions[box][1]) - y for box in standing) / max(len(standing), 1)
     return [
-        action.table is None,
+        ground.into_hand,
         x,
         side * y,
         z,
@@ -69,7 +70,7 @@ def features(
         len(standing),
         dx,
         side * dy,
-        len(state.standing_on(action.box)) > 0,
+        len(state.standing_on(ground.body)) > 0,
     ]
 
 

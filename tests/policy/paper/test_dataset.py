@@ -189,7 +189,7 @@ def test_variant_with_the_named_boxes_first(
             decoded = decode_goals(variant.goals[goals], own)
             world_order = variant.states[state].reshape(7, 3)[order].tobytes()
             sample = decoded, world_order, decode_action(variant.actions[state], own)
-            named = dict.fromkeys(n for g in decoded for n in (g.box, g.table) if n in boxes)
+            named = dict.fromkeys(n for g in decoded for n in g.symbols if n in boxes)
             if sample in remaining:
                 assert boxes[: len(named)] == tuple(named)
                 found.add(sample)
@@ -222,8 +222,8 @@ def test_variant_with_what_the_state_means(
         at = {box: names[code.argmax()] for box, code in zip(symbols.boxes, places, strict=True)}
         for code in variant.goals[variant.sample_goals[sample]].reshape(2, 11):
             (goal, _) = decode_goals(np.tile(code[:10], 2), symbols)
-            held = goal.kind == "held" and at[goal.box] in symbols.grippers
-            assert code[10] == (held or at[goal.box] == goal.table)
+            held = goal.kind == "held" and at[goal.symbols[0]] in symbols.grippers
+            assert code[10] == (held or at[goal.symbols[0]] == goal.symbols[-1])
 
 
 def test_variant_without_chain(

@@ -105,13 +105,14 @@ def test_scores_are_the_product_of_the_conditionals_of_torch(
     expected = []
     for action in ACTIONS:
         instruction = ("grasp", "place").index(action.instruction)
-        gripper, box = GRIPPERS.index(action.gripper), BOXES.index(action.box)
+        held_by, held, *support = action.symbols
+        gripper, box = GRIPPERS.index(held_by), BOXES.index(held)
         p = conditional("instruction", "instruction", [], instruction)
         p *= conditional(action.instruction, "gripper", [], gripper)
         p *= conditional(action.instruction, "box", one_hot(2, gripper), box)
-        if action.table is not None:
+        if support:
             previous = one_hot(2, gripper) + one_hot(3, box)
-            p *= conditional("place", "table", previous, TABLES.index(action.table))
+            p *= conditional("place", "table", previous, TABLES.index(support[0]))
         expected.append(p)
     scores = load_networks(models, "train_policy").log_probabilities(*situation, ACTIONS)
     np.testing.assert_allclose(np.exp(scores), expected, atol=1e-6)
