@@ -1,16 +1,18 @@
 """A checker of plan files, written from the description of their format alone.
 
-It shares no code with the planner: kinematics by pinocchio on the URDF of ``example-robot-data``,
-collisions by PyBullet between the convex hulls of its meshes, each placed where pinocchio puts it,
-and the boxes carried along as the attachments say. ``check(document)`` returns the faults.
+It shares no code with the planner, only the robot files: kinematics by pinocchio on the URDF that
+such a file names, collisions by PyBullet between the convex hulls of its meshes, each placed where
+pinocchio puts it, and the boxes carried along as the attachments say. ``check(document)`` returns
+the faults.
 
 Conventions: lengths in m, angles in rad, times in s; poses are homogeneous matrices (..., 4, 4) in
-the world, whose floor carries ``base_footprint`` at the scene's ``robot.base`` (x, y, yaw). A *row*
-is an index into ``path.times``; *interval* i lies between rows i and i + 1, where joints move
+the world, where the base link is at the scene's ``robot.base`` (x, y, yaw) and ``robot.height``. A
+*row* is an index into ``path.times``; *interval* i lies between rows i and i + 1, where joints move
 linearly.
 """
 
 import itertools
+import json
 import re
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -22,13 +24,19 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 import pinocchio as pin
 import pybullet
+import yaml
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 SHARE = Path(str(distribution("example-robot-data").locate_file("cmeel.prefix/share")))
-PR2 = SHARE / "example-robot-data" / "robots" / "pr2_description"
-URDF, SRDF = PR2 / "urdf" / "pr2.urdf", PR2 / "srdf" / "pr2.srdf"
-SIDES = {"pr2L": "l", "pr2R": "r"}
+DESCRIPTIONS = SHARE / "example-robot-data" / "robots"
+ROBOTS = Path(__file__).parents[2] / "src" / "guided_lgp" / "robots"
+COLUMN = "robot.column"
+AXES = {
+    f"{sign}{axis}": row
+    for sign, rows in (("", np.eye(3)), ("-", -np.eye(3)))
+    for axis, row in zip("xyz", rows, strict=True)
+}
 
 PENETRATION = 0.005  # allowed everywhere outside the declared contacts
 IN_HAND = 0.015  # allowed within them: the hull of a finger fills the hollow of its inner side
@@ -69,12 +77,24 @@ class Keyframe(NamedTuple):
     boxes: dict[str, tuple[np.ndarray, float]]  # position and yaw
 
 
+class Hand(NamedTuple):
+    """What the robot file says of a gripper."""
+
+    tool: str  # link
+    frame: np.ndarray  # (4, 4) of the tool frame in it: x out of the palm, fingers close along y
+    links: list[str]  # the palm first
+    fingers: list[str]  # joints; the others follow the first
+
+
 @dataclass(frozen=True)
 class Plan:
+    hands: dict[str, Hand]
+    urdf: Path
+    srdf: Path | None
+    stand: tuple[float, float]  # half extents of the column under a raised base
     boxes: dict[str, dict[str, Any]]
     tables: dict[str, dict[str, Any]]
-    base: tuple[float, float, float]
-    torso: float
+    base: tuple[float, float, float, float]  # x, y, height, yaw
     goals: list[tuple[str, ...]]
     actions: list[tuple[str, ...]]
     joints: list[str]
@@ -135,14 +155,19 @@ def _atom(text: str, **arity: int) -> tuple[str, ...]:
 
 def _read(document: Mapping[str, Any]) -> Plan:
     scene, path = document["scene"], document["path"]
-    x, y, yaw = map(float, scene["robot"]["base"])
+    placed = scene["robot"]
+    x, y, yaw = map(float, placed["base"])
+    robot = _robot_file(placed["model"])
     plan = Plan(
+        hands={name: _hand(arm) for name, arm in robot["arms"].items()},
+        urdf=robot["description"]["urdf"],
+        srdf=robot["description"].get("srdf"),
+        stand=tuple(robot.get("stand", (0.1, 0.1))),
         boxes={box["name"]: box for box in scene["boxes"]},
         tables={table["name"]: table for table in scene["tables"]},
-        base=(x, y, yaw),
-        torso=float(scene["robot"]["torso"]),
+        base=(x, y, float(placed.get("height", 0.0)), yaw),
         goals=[_atom(goal, held=1, on=2) for goal in document["objective"]],
-        actions=[_atom(action, grasp=2, place=3) for action in document["actions"]],
+        actions=[_atom(action, grasp=2, place=3, take=3) for action in document["actions"]],
         joints=list(document["joint_names"]),
         fixed={name: float(value) for name, value in document["fixed_joints"].items()},
         times=np.array(path["times"], float),
@@ -171,15 +196,16 @@ def _read(document: Mapping[str, Any]) -> Plan:
         raise ValueError("path.times do not increase")
     if len(set(plan.joints)) < len(plan.joints) or set(plan.joints) & set(plan.fixed):
         raise ValueError("a joint is listed twice")
-    if plan.fixed.get("torso_lift_joint", 0.0) != plan.torso:
-        raise ValueError("torso_lift_joint is not at the scene's torso")
+    for name, joint in robot.get("fixed_joints", {}).items():
+        if plan.fixed.get(joint["joint"]) != float(placed[name]):
+            raise ValueError(f"{joint['joint']} is not at the scene's {name}")
     grounded = set(plan.tables)
     for _ in plan.boxes:
         grounded |= {name for name, box in plan.boxes.items() if box["on"] in grounded}
     if not plan.boxes.keys() <= grounded:
         raise ValueError("a box of the scene stands on nothing")
     for box, gripper, start, end in plan.attachments:
-        if box not in plan.boxes or gripper not in SIDES or not 0 <= start < end < rows:
+        if box not in plan.boxes or gripper not in plan.hands or not 0 <= start < end < rows:
             raise ValueError(f"no such attachment: {box} {gripper} {start} {end}")
     if len(plan.keyframes) != len(plan.actions):
         raise ValueError(f"{len(plan.keyframes)} keyframes for {len(plan.actions)} actions")
@@ -187,6 +213,33 @@ def _read(document: Mapping[str, Any]) -> Plan:
         if keyframe.q.shape != plan.q[0].shape or keyframe.boxes.keys() != plan.boxes.keys():
             raise ValueError("a keyframe lacks a joint or a box")
     return plan
+
+
+def _robot_file(model: str) -> dict[str, Any]:
+    """A robot file with the arms that mirror others written out, and its files found."""
+    file = ROBOTS / f"{model}.yaml" if (ROBOTS / f"{model}.yaml").is_file() else Path(model)
+    robot: dict[str, Any] = yaml.safe_load(file.read_text(encoding="utf-8"))
+    arms = robot["arms"]
+    whole = {
+        name: arms[arm["mirrors"]] | arm if "mirrors" in arm else arm for name, arm in arms.items()
+    }
+    robot["arms"] = {
+        name: json.loads(json.dumps(arm).replace("<side>", arm.get("side", "")))
+        for name, arm in whole.items()
+    }
+    description = robot["description"]
+    folder = DESCRIPTIONS if "package" in description else file.parent
+    for key in {"urdf", "srdf"} & description.keys():
+        description[key] = folder / description[key]
+    return robot
+
+
+def _hand(arm: Mapping[str, Any]) -> Hand:
+    tool, frame = arm["tool"], np.eye(4)
+    x, y = AXES[tool["approach"]], AXES[tool["closing"]]
+    frame[:3, :3] = np.column_stack([x, y, np.cross(x, y)])
+    frame[:3, 3] = tool.get("offset", (0, 0, 0))
+    return Hand(tool["link"], frame, arm["hand_links"], arm.get("fingers", {}).get("joints", []))
 
 
 def _merged(attachments: Iterable[Attachment]) -> list[Attachment]:
@@ -240,13 +293,15 @@ class State:
         return [box for box in self.support if item in self.chain(box)[1:]]
 
     def apply(self, action: tuple[str, ...]) -> None:
-        kind, gripper, box, *table = action
-        if kind == "grasp":
-            self.holds[gripper] = box
-            del self.support[box]
-        else:
-            del self.holds[gripper]
-            self.support[box] = table[0]
+        match action:
+            case "grasp", gripper, box:
+                self.holds[gripper] = box
+                del self.support[box]
+            case "take", gripper, giver, box:
+                self.holds[gripper] = self.holds.pop(giver)
+            case "place", gripper, box, table:
+                del self.holds[gripper]
+                self.support[box] = table
 
 
 def _start(plan: Plan) -> State:
@@ -256,23 +311,36 @@ def _start(plan: Plan) -> State:
 def _legal(plan: Plan) -> Iterator[Fault]:
     state = _start(plan)
     for action in plan.actions:
-        kind, gripper, box, *table = action
-        names = {gripper} <= SIDES.keys() and {box} <= plan.boxes.keys()
-        if not names or not set(table) <= plan.boxes.keys() | plan.tables.keys():
-            why = "a name is not in the scene"
-        elif kind == "grasp" and gripper in state.holds:
-            why = f"{gripper} is not free"
-        elif kind == "grasp" and box in state.holds.values():
-            why = f"{box} is held already"
-        elif kind == "place" and state.holds.get(gripper) != box:
-            why = f"{gripper} does not hold {box}"
-        elif kind == "place" and box in state.chain(table[0]):
-            why = f"{table[0]} stands on {box}"
-        else:
-            state.apply(action)
-            continue
-        yield Fault("logic", None, f"{_text(action)}: {why}")
-        return
+        why = _illegal(plan, state, action)
+        if why:
+            yield Fault("logic", None, f"{_text(action)}: {why}")
+            return
+        state.apply(action)
+
+
+def _illegal(plan: Plan, state: State, action: tuple[str, ...]) -> str:
+    """Why an action is not allowed in a state; empty if it is."""
+    kind, gripper, *others = action
+    box = others[-1] if kind == "take" else others[0]
+    givers = others[:-1] if kind == "take" else []
+    table = others[1] if kind == "place" else None
+    if not {gripper, *givers} <= plan.hands.keys() or box not in plan.boxes:
+        return "a name is not in the scene"
+    if table is not None and table not in plan.boxes.keys() | plan.tables.keys():
+        return "a name is not in the scene"
+    if table is None and gripper in state.holds:
+        return f"{gripper} is not free"
+    if kind == "grasp" and box in state.holds.values():
+        return f"{box} is held already"
+    if any(state.holds.get(giver) != box for giver in givers):
+        return f"{givers[0]} does not hold {box}"
+    if givers and state.carried(box):
+        return f"{box} carries others"
+    if table is not None and state.holds.get(gripper) != box:
+        return f"{gripper} does not hold {box}"
+    if table is not None and box in state.chain(table):
+        return f"{table} stands on {box}"
+    return ""
 
 
 def _text(words: Sequence[str]) -> str:
@@ -287,39 +355,47 @@ class _UnmatchedError(Exception):
 
 @dataclass(frozen=True)
 class Event:
-    """An action takes effect at a row; the attachment is that of the box in the gripper."""
+    """An action takes effect at a row: a gripper takes hold of a box, another lets go of it."""
 
     action: tuple[str, ...]
     row: int
-    attachment: Attachment
+    taken: Attachment | None
+    released: Attachment | None
 
 
 def _events(plan: Plan) -> list[Event]:
     """When each action takes effect, in the order of the actions.
 
-    A grasp begins the first attachment of its pair from then on, the next place of its gripper
-    ends it. Other attachments must belong to boxes that ride on a held one.
+    A grasp or take begins the first attachment of its pair from then on; the next place of its
+    gripper, or take from it, ends it. Other attachments must belong to boxes that ride on a held
+    one.
     """
     events: list[Event] = []
     held: dict[str, Attachment] = {}
     now, last = 0, len(plan.times) - 1
     for action in plan.actions:
-        kind, gripper, box, *_ = action
-        if kind == "grasp":
+        kind, gripper, *others = action
+        box, taken, released = others[-1] if kind == "take" else others[0], None, None
+        if kind == "place":
+            released = held.pop(gripper)
+            row = released.end
+            if row < now:
+                text = f"{_text(action)}: takes effect before the action before it"
+                raise _UnmatchedError(Fault("order", row, text))
+        else:
             mine = [a for a in plan.attachments if a[:2] == (box, gripper)]
             later = [a for a in mine if a.start >= now]
             if not later:
                 text = f"{_text(action)}: no attachment from row {now} on"
                 raise _UnmatchedError(Fault("order" if mine else "attachment", now, text))
-            held[gripper], row = later[0], later[0].start
-        else:
-            row = held[gripper].end
-            if row < now:
-                text = f"{_text(action)}: takes effect before the action before it"
-                raise _UnmatchedError(Fault("order", row, text))
-        events.append(Event(action, row, held[gripper]))
-        if kind == "place":
-            del held[gripper]
+            held[gripper] = taken = later[0]
+            row = taken.start
+            if kind == "take":
+                released = held.pop(others[0])
+                if released.end != row:
+                    text = f"{_text(action)}: {others[0]} lets go at row {released.end}"
+                    raise _UnmatchedError(Fault("attachment", row, text))
+        events.append(Event(action, row, taken, released))
         now = row
     for gripper, attachment in held.items():
         if attachment.end != last:
@@ -372,27 +448,35 @@ def _goals(plan: Plan, events: Sequence[Event]) -> Iterator[Fault]:
 
 
 class Robot:
-    """The PR2 of the package: limits, hulls of its links, and where they are."""
+    """The robot of the plan: limits, hulls of its links, and where they are.
+
+    A link may have several hulls, each with a name of its own; ``link`` has the link of each.
+    """
 
     def __init__(self, plan: Plan) -> None:
         self.plan = plan
-        self.model = pin.buildModelFromUrdf(str(URDF))
+        self.model = pin.buildModelFromUrdf(str(plan.urdf))
         self.geometry = pin.buildGeomFromUrdf(
-            self.model, str(URDF), pin.GeometryType.COLLISION, package_dirs=[str(SHARE)]
+            self.model, str(plan.urdf), pin.GeometryType.COLLISION, package_dirs=[str(SHARE)]
         )
-        self.hulls = {
-            self.model.frames[item.parentFrame].name: _vertices(item)
-            for item in self.geometry.geometryObjects
-        }
-        self.base = _planar(*plan.base[:2], 0.0, plan.base[2])
+        items = self.geometry.geometryObjects
+        self.hulls = {item.name: _vertices(item) for item in items}
+        self.link = {item.name: self.model.frames[item.parentFrame].name for item in items}
+        self.fixed = {item.name for item in items if item.parentJoint == 0}
+        self.base = _planar(*plan.base)
+
+    def hull_names(self, links: Iterable[str]) -> list[str]:
+        """The hulls of links."""
+        return [name for wanted in links for name, link in self.link.items() if link == wanted]
 
     def unknown(self) -> Iterator[Fault]:
         for name in [*self.plan.joints, *self.plan.fixed]:
             if not self.model.existJointName(name):
                 yield Fault("format", None, f"the robot has no joint {name}")
         for gripper in {attachment.gripper for attachment in self.plan.attachments}:
-            if _finger(gripper) not in self.plan.joints:
-                yield Fault("format", None, f"{_finger(gripper)} is not in joint_names")
+            for finger in self.plan.hands[gripper].fingers:
+                if finger not in self.plan.joints:
+                    yield Fault("format", None, f"{finger} is not in joint_names")
 
     def joint(self, name: str) -> Any:
         return self.model.joints[self.model.getJointId(name)]
@@ -409,7 +493,8 @@ class Robot:
         """Poses (n, 4, 4) of the links that have a hull, and of the grippers' tool frames."""
         model, geometry = self.model, self.geometry
         data, placed = model.createData(), geometry.createData()
-        tools = {g: model.getFrameId(f"{s}_gripper_tool_frame") for g, s in SIDES.items()}
+        hands = self.plan.hands.values()
+        tools = [(model.getFrameId(hand.tool), hand.frame) for hand in hands]
         links = np.empty((len(self.hulls), len(rows), 4, 4))
         grips = np.empty((len(tools), len(rows), 4, 4))
         names = [*self.plan.fixed, *self.plan.joints]
@@ -427,18 +512,14 @@ class Robot:
             pin.updateGeometryPlacements(model, data, geometry, placed)
             for index, pose in enumerate(placed.oMg):
                 links[index, row] = pose.homogeneous
-            for index, frame in enumerate(tools.values()):
-                grips[index, row] = pin.updateFramePlacement(model, data, frame).homogeneous
+            for index, (link, frame) in enumerate(tools):
+                placement = pin.updateFramePlacement(model, data, link)
+                grips[index, row] = placement.homogeneous @ frame
         links, grips = self.base @ links, self.base @ grips
         return (
             dict(zip(self.hulls, links, strict=True)),
-            dict(zip(tools, grips, strict=True)),
+            dict(zip(self.plan.hands, grips, strict=True)),
         )
-
-
-def _finger(gripper: str) -> str:
-    """The joint that opens the gripper; the others of its fingers follow it."""
-    return f"{SIDES[gripper]}_gripper_l_finger_joint"
 
 
 def _vertices(item: Any) -> np.ndarray:
@@ -477,7 +558,7 @@ def _velocities(plan: Plan, robot: Robot) -> Iterator[Fault]:
 def _mimics(plan: Plan) -> Iterator[Fault]:
     """The fingers of a gripper are driven by one motor."""
     column = plan.fixed | dict(zip(plan.joints, plan.q.T, strict=True))
-    for joint in ET.parse(URDF).getroot().iter("joint"):
+    for joint in ET.parse(plan.urdf).getroot().iter("joint"):
         mimic, name = joint.find("mimic"), joint.get("name", "")
         if mimic is None or name not in plan.joints:
             continue
@@ -596,14 +677,14 @@ def _leaves(tool: np.ndarray, row: int, distance: float, step: Literal[-1, 1]) -
 
 def _fingers(plan: Plan, events: Sequence[Event], motion: Motion) -> Iterator[Fault]:
     """The fingers are open on the way to a box, closed while they hold it, open on the way off."""
-    for event in events:
-        (box, gripper, start, end), tool = event.attachment, motion.tools[event.attachment.gripper]
-        opening = plan.q[:, plan.joints.index(_finger(gripper))]
-        if event.action[0] == "place":
-            left = _leaves(tool, end, AWAY, 1)
-            if left is not None and opening[left] < opening[end] + OPENED:
-                yield Fault("fingers", left, f"{gripper} leaves {box} without opening")
-            continue
+    released = [event.released for event in events]
+    for box, gripper, start, end in _held(plan, events):
+        tool = motion.tools[gripper]
+        opening = plan.q[:, plan.joints.index(plan.hands[gripper].fingers[0])]
+        left = _leaves(tool, end, AWAY, 1)
+        given = Attachment(box, gripper, start, end) in released
+        if given and left is not None and opening[left] < opening[end] + OPENED:
+            yield Fault("fingers", left, f"{gripper} leaves {box} without opening")
         came = _leaves(tool, start, AWAY, -1)
         if came is not None and opening[came] < opening[start] + OPENED:
             yield Fault("fingers", came, f"{gripper} comes to {box} without opening")
@@ -612,21 +693,27 @@ def _fingers(plan: Plan, events: Sequence[Event], motion: Motion) -> Iterator[Fa
             yield Fault("fingers", start + int(moved.argmax()), f"{gripper} moves fingers on {box}")
 
 
+def _held(plan: Plan, events: Sequence[Event]) -> Iterator[Attachment]:
+    """Boxes in hands whose fingers move."""
+    for event in events:
+        if event.taken is not None and plan.hands[event.taken.gripper].fingers:
+            yield event.taken
+
+
 def _grasps(plan: Plan, robot: Robot, events: Sequence[Event], motion: Motion) -> Iterator[Fault]:
-    """When a grasp takes effect, both fingers are at the box, on opposite sides of it."""
+    """When a gripper takes hold of a box, fingers are at it on opposite sides of it."""
     with _World(plan, robot) as world:
-        for event in (event for event in events if event.action[0] == "grasp"):
-            box, gripper, row, _ = event.attachment
+        for taken in (event.taken for event in events if event.taken is not None):
+            box, gripper, row, _ = taken
+            hand = plan.hands[gripper]
             into = _inverse(motion.tools[gripper][row])
-            sides = []
-            for finger in "lr":
-                points: list[tuple[tuple[float, ...], float]] = []
-                for part in ("finger", "finger_tip"):
-                    link = f"{SIDES[gripper]}_gripper_{finger}_{part}_link"
-                    poses = {link: motion.links[link][row], box: motion.boxes[box][row]}
-                    points += world.closest(link, box, poses, AT_BOX)
-                sides += [(into @ (*on_box, 1))[1] for on_box, _ in points[:1]]
-            if len(sides) < 2 or sides[0] * sides[1] > 0:
+            sides = set()
+            # the palm is the first link; where the jaws do not move, they may be one with it
+            for hull in robot.hull_names(hand.links[1:] if hand.fingers else hand.links):
+                poses = {hull: motion.links[hull][row], box: motion.boxes[box][row]}
+                for on_box, _ in world.closest(hull, box, poses, AT_BOX):
+                    sides.add(np.sign((into @ (*on_box, 1))[1]))
+            if not {-1.0, 1.0} <= sides:
                 text = f"{gripper} does not have {box} between its fingers"
                 yield Fault("grasp", row, text)
 
@@ -646,6 +733,10 @@ class _World:
             x, y = table["half_extents"]
             slab = _corners((2 * x, 2 * y, TABLE_THICKNESS))
             self.vertices[name] = slab - (0, 0, TABLE_THICKNESS / 2)
+        height = plan.base[2]
+        if height:
+            column = _corners((2 * plan.stand[0], 2 * plan.stand[1], height))
+            self.vertices[COLUMN] = column - (0, 0, height / 2)
         self.bodies = {}
         for name, vertices in self.vertices.items():
             shape = pybullet.createCollisionShape(
@@ -713,7 +804,8 @@ def _collisions(
         dense[box][intervals >= end] = motion.boxes[box][end]
     for table in plan.tables:
         dense[table] = np.tile(_scene_pose(plan, table), (len(q), 1, 1))
-    declared = _declared_contacts(events, motion)
+    dense[COLUMN] = np.tile(robot.base, (len(q), 1, 1))
+    declared = _declared_contacts(plan, robot, events, motion)
     with _World(plan, robot) as world:
         ranges = {}
         for name, vertices in world.vertices.items():
@@ -733,32 +825,33 @@ def _collisions(
             worst = int((depths - allowed).argmax())
             if depths[worst] > allowed[worst]:
                 row = int(intervals[worst])
-                text = f"{first} is {1e3 * depths[worst]:.0f} mm inside {second}"
+                one, other = (robot.link.get(name, name) for name in (first, second))
+                text = f"{one} is {1e3 * depths[worst]:.0f} mm inside {other}"
                 yield Fault("collision", row, f"{text} at {plan.times[row]:.2f} s")
 
 
 def _pairs(plan: Plan, robot: Robot) -> Iterator[tuple[str, str]]:
-    disabled = {
-        frozenset((pair.get("link1"), pair.get("link2")))
-        for pair in ET.parse(SRDF).getroot().iter("disable_collisions")
-    }
-    for pair in itertools.combinations([*robot.hulls, *plan.boxes, *plan.tables], 2):
-        if frozenset(pair) not in disabled and not set(pair) <= plan.tables.keys():
+    disabled = set()
+    if plan.srdf is not None:
+        pairs = ET.parse(plan.srdf).getroot().iter("disable_collisions")
+        disabled = {frozenset((pair.get("link1"), pair.get("link2"))) for pair in pairs}
+    column = [COLUMN] if plan.base[2] else []
+    still = robot.fixed | plan.tables.keys() | set(column)  # what touches there always does
+    for pair in itertools.combinations([*robot.hulls, *plan.boxes, *plan.tables, *column], 2):
+        links = frozenset(robot.link.get(name, name) for name in pair)
+        if len(links) == 2 and links not in disabled and not set(pair) <= still:
             yield pair
 
 
 def _declared_contacts(
-    events: Sequence[Event], motion: Motion
+    plan: Plan, robot: Robot, events: Sequence[Event], motion: Motion
 ) -> dict[tuple[str, str], list[tuple[int, int]]]:
     """Intervals, by link of a hand and box, from the approach to a box to the retreat from it."""
     contacts: dict[tuple[str, str], list[tuple[int, int]]] = {}
-    for event in events:
-        if event.action[0] == "place":
-            continue
-        (box, gripper, start, end), tool = event.attachment, motion.tools[event.attachment.gripper]
+    for box, gripper, start, end in (event.taken for event in events if event.taken is not None):
+        tool = motion.tools[gripper]
         begin = _leaves(tool, start, APPROACH, -1) or 0
         until = _leaves(tool, end, APPROACH, 1) or len(tool)
-        for part in ("palm", "l_finger", "l_finger_tip", "r_finger", "r_finger_tip"):
-            link = f"{SIDES[gripper]}_gripper_{part}_link"
-            contacts.setdefault((link, box), []).append((begin, until))
+        for hull in robot.hull_names(plan.hands[gripper].links):
+            contacts.setdefault((hull, box), []).append((begin, until))
     return contacts

@@ -11,6 +11,13 @@ import numpy as np
 import pytest
 from plan_checker import Fault, check
 
+from guided_lgp.bounds.plan_file import write_plan
+from guided_lgp.bounds.scene_bounds import SceneBounds
+from guided_lgp.logic import parse_objective, parse_skeleton
+from guided_lgp.params import load_params
+from guided_lgp.paths import SOURCES
+from guided_lgp.scene import Scene, generate, parse_scene
+
 EXAMPLES = Path(__file__).parents[2] / "examples"
 TASKS = {
     "two_goals": ("three_boxes", "(on red green)", "(held blue)"),
@@ -249,3 +256,59 @@ def test_a_file_of_another_form_is_told(
         item = item[key]
     item[last] = value
     assert [fault.kind for fault in check(plan)] == ["format"]
+
+
+def written_plan(folder: Path, scene: Scene, skeleton: str, goal: str) -> dict[str, Any]:
+    """The plan file of a skeleton that the bounds carry out."""
+    result = SceneBounds(scene, load_params(SOURCES / "params.yaml").bounds).path(
+        parse_skeleton(skeleton)
+    )
+    assert result.feasible, result.failure
+    write_plan(folder / "plan.json", scene, parse_objective([goal]), result, {})
+    document: dict[str, Any] = json.loads((folder / "plan.json").read_text())
+    return document
+
+
+@pytest.fixture(scope="module")
+def handed_over(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    scene = generate("a", 1, 77, "handover").scenes[0].model_copy(update={"domain": "handover"})
+    skeleton = "(grasp pr2L green) (take pr2R pr2L green) (place pr2R green blue)"
+    return written_plan(tmp_path_factory.mktemp("take"), scene, skeleton, "(on green blue)")
+
+
+def test_a_hand_over_is_accepted(handed_over: dict[str, Any]) -> None:
+    assert check(handed_over) == []
+
+
+def test_a_giver_that_does_not_let_go_at_the_take_is_told(handed_over: dict[str, Any]) -> None:
+    plan = copy.deepcopy(handed_over)
+    given = min(plan["path"]["attachments"], key=lambda attachment: attachment["start"])
+    given["end"] += 5
+    assert "attachment" in kinds(check(plan))
+
+
+def test_a_take_from_an_empty_hand_is_told(handed_over: dict[str, Any]) -> None:
+    plan = copy.deepcopy(handed_over)
+    plan["actions"][1] = "(take pr2R pr2L blue)"
+    assert kinds(check(plan)) == {"logic"}
+
+
+def test_one_arm_on_a_column_is_accepted_and_its_faults_told(tmp_path: Path) -> None:
+    table = {"position": [0.5, 0.0, 0.4], "half_extents": [0.17, 0.4]}
+    size = [0.12, 0.05, 0.08]
+    scene = parse_scene(
+        {
+            "robot": {"model": "panda", "height": 0.4},
+            "tables": [{"name": "tab1", **table}],
+            "boxes": [
+                {"name": "red", "size": size, "position": [0.5, 0.25, 0.44], "on": "tab1"},
+                {"name": "green", "size": size, "position": [0.5, -0.25, 0.44], "on": "tab1"},
+            ],
+        },
+        "scene.json",
+    )
+    skeleton = "(grasp panda red) (place panda red green)"
+    plan = written_plan(tmp_path, scene, skeleton, "(on red green)")
+    assert check(plan) == []
+    set_joint(plan, "panda_finger_joint1", 0.0)
+    assert {"mimic", "fingers", "grasp"} & kinds(check(plan))
