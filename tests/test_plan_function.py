@@ -53,28 +53,28 @@ def obstacles(
 def test_equal_obstacles_are_counted_and_the_shortest_sequence_is_the_example() -> None:
     (found,) = obstacles(
         {
-            "(grasp pr2L green) (grasp pr2R red)": Failure(1, "reach pr2R red", 0.01, "9 starts"),
-            "(grasp pr2R red)": Failure(0, "reach pr2R red", 0.02, "9 starts"),
+            "(grasp pr2L green) (grasp pr2R red)": Failure(1, "hold pr2R red", 0.01, "9 starts"),
+            "(grasp pr2R red)": Failure(0, "hold pr2R red", 0.02, "9 starts"),
         }
     )
     assert found.action == Action("grasp", ("pr2R", "red"))
     assert (found.sequences, found.example, found.violation) == (2, (found.action,), 0.02)
-    assert str(found) == ("(grasp pr2R red): action 1: reach pr2R red violated by 0.02 (9 starts)")
+    assert str(found) == ("(grasp pr2R red): action 1: hold pr2R red violated by 0.02 (9 starts)")
 
 
 def test_what_is_nearest_to_the_goals_comes_first() -> None:
     reaching = "(grasp pr2L red) (place pr2L red green)"
     found = obstacles(
         {
-            "(grasp pr2R red)": Failure(0, "reach pr2R red", 0.001, ""),
-            "(grasp pr2R red) (place pr2R red green)": Failure(1, "support red green", 0.1, ""),
+            "(grasp pr2R red)": Failure(0, "hold pr2R red", 0.001, ""),
+            "(grasp pr2R red) (place pr2R red green)": Failure(1, "balanced red green", 0.1, ""),
         },
         {reaching: Failure(1, "no motion found to place red", float("nan"), "")},
     )
     assert [obstacle.constraint for obstacle in found] == [
         "no motion found to place red",
-        "support red green",
-        "reach pr2R red",
+        "balanced red green",
+        "hold pr2R red",
     ]
     assert found[0].bound == "path"
     assert found[0].document()["violation"] is None
@@ -91,8 +91,13 @@ def test_a_sequence_asked_twice_counts_once() -> None:
 @pytest.mark.parametrize(
     ("name", "goals", "nodes", "culprits"),
     [
-        ("impossible_tower", ["(on red green)", "(on blue red)"], 400, {"reach", "collision"}),
-        ("impossible_pair", ["(on wide1 small)", "(on wide2 small)"], 1000, {"support", "reach"}),
+        ("impossible_tower", ["(on red green)", "(on blue red)"], 400, {"hold", "clear"}),
+        (
+            "impossible_pair",
+            ["(on wide1 small)", "(on wide2 small)"],
+            1000,
+            {"balanced", "beside", "hold"},
+        ),
     ],
 )
 def test_impossible_tasks_name_the_action_the_constraint_and_the_amount(

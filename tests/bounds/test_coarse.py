@@ -128,7 +128,7 @@ def test_a_failure_names_constraint_and_action() -> None:
     result = CoarseBound(scene, 9).solve(parse_skeleton("(grasp pr2L red) (place pr2L red shelf)"))
     assert not result.feasible
     assert result.failure is not None
-    assert (result.failure.action, result.failure.constraint) == (1, "overlap red full")
+    assert (result.failure.action, result.failure.constraint) == (1, "beside red full")
     assert 0.001 < result.failure.violation < 0.1
     assert "9 starts" in str(result.failure)
 
@@ -138,7 +138,7 @@ def test_what_an_arm_cannot_reach_is_said_without_a_start(bound: CoarseBound) ->
         parse_skeleton("(grasp pr2L red) (place pr2L red tab1) (grasp pr2R green)")
     )
     assert result.failure is not None
-    assert (result.failure.action, result.failure.constraint) == (2, "reach pr2R green")
+    assert (result.failure.action, result.failure.constraint) == (2, "hold pr2R green")
     assert result.restarts == 0
 
 

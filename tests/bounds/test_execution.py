@@ -64,7 +64,7 @@ def test_gripper_that_is_not_at_the_box_grasps_nothing(neighbours: Scene) -> Non
     objective = parse_objective(["(held red)"])
     report = execute(neighbours, objective, STACK[:1], motion.trajectory(PERIOD))
     assert not report.success
-    assert report.fault == "grasp red"
+    assert report.fault == "pads pr2L red"
 
 
 def test_box_in_the_way_is_pushed(neighbours: Scene) -> None:

@@ -120,5 +120,5 @@ def test_a_denied_skeleton_costs_no_start(scene: Scene) -> None:
     assert (result.feasible, result.restarts) == (False, 0)
     assert result.failure is not None
     assert str(result.failure) == (
-        "action 1: reach pr2L blue violated (proved for the arm alone, collisions left out)"
+        "action 1: hold pr2L blue violated (proved for the arm alone, collisions left out)"
     )

@@ -66,6 +66,6 @@ def test_ipopt_finds_the_sequences_feasible_that_the_bound_does(skeleton: str) -
 def test_ipopt_agrees_that_a_box_out_of_reach_is_out_of_reach() -> None:
     result = CoarseBound(SCENE, 9).solve(parse_skeleton(OUT_OF_REACH))
     assert result.failure is not None
-    assert result.failure.constraint == "reach pr2R far"
+    assert result.failure.constraint == "hold pr2R far"
     _, theirs = _oracle(OUT_OF_REACH)
     assert theirs.violation > 10 * SETTINGS.tolerance

@@ -103,7 +103,7 @@ def _verdicts(scene: Scene, rng: np.random.Generator) -> list[dict[str, Any]]:
             for action in applicable_actions(state, scene.symbols):
                 skeleton = (*prefix, action)
                 feasible = bool(rng.random() < 0.8)
-                constraint = rng.choice(["reach", "collision l_forearm_link tab2", "placement"])
+                constraint = rng.choice(["hold", "clear l_forearm_link tab2", "placement"])
                 rows.append(
                     {
                         "configuration": scene.name,

@@ -22,10 +22,10 @@ SCENE = Scene(
 @pytest.mark.parametrize(
     ("constraint", "kind"),
     [
-        ("collision l_forearm_link tab2", "collision robot–table"),
-        ("collision red r_gripper_palm_link", "collision box–robot"),
-        ("support red tab1", "support box–table"),
-        ("reach pr2L red", "reach"),
+        ("clear l_forearm_link tab2", "clear robot–table"),
+        ("clear r_gripper_palm_link red", "clear box–robot"),
+        ("balanced red tab1", "balanced box–table"),
+        ("hold pr2L red", "hold"),
         ("width of red", "width"),
         ("joint limit l_elbow_flex_joint", "joint limit"),
         ("no motion found", "no motion found"),
@@ -68,7 +68,7 @@ def test_last_actions_by_arm_and_table() -> None:
 
 
 def test_failures_are_counted_by_constraint_and_action() -> None:
-    rows = [("reach pr2L red", 0), ("reach pr2R red", 2), ("overlap red green", 2)]
+    rows = [("hold pr2L red", 0), ("hold pr2R red", 2), ("beside red green", 2)]
     verdicts = pd.DataFrame(
         [
             {
@@ -81,8 +81,8 @@ def test_failures_are_counted_by_constraint_and_action() -> None:
         ]
     )
     counts = analysis.failures(verdicts, {"s": SCENE})
-    assert list(counts.index) == ["reach", "overlap"]
-    assert counts.loc["reach"].to_dict() == {1: 1, 3: 1}
+    assert list(counts.index) == ["hold", "beside box–box"]
+    assert counts.loc["hold"].to_dict() == {1: 1, 3: 1}
 
 
 def test_without_failures_the_table_is_empty() -> None:

@@ -5,7 +5,7 @@ many times faster than arrays.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from guided_lgp.poses import pose
@@ -34,6 +34,26 @@ class Violation:
 def box_sizes(scene: Scene) -> dict[str, tuple[float, float, float]]:
     """Extents (m) of every box."""
     return {box.name: box.size for box in scene.boxes}
+
+
+def body_names(scene: Scene) -> frozenset[str]:
+    """Boxes and tables."""
+    return frozenset([*(box.name for box in scene.boxes), *(table.name for table in scene.tables)])
+
+
+def overlap_name(first: str, second: str, bodies: Collection[str]) -> str:
+    """The constraint that two overlapping parts violate.
+
+    ``clear link body``, ``apart link link`` or ``beside body body``.
+
+    Args:
+        first: a link of the robot, or a body.
+        second: another one.
+        bodies: names of all boxes and tables.
+    """
+    links = [name for name in (first, second) if name not in bodies]
+    others = [name for name in (first, second) if name in bodies]
+    return " ".join((("beside", "clear", "apart")[len(links)], *links, *others))
 
 
 @dataclass(frozen=True)

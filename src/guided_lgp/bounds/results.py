@@ -32,7 +32,7 @@ class Failure:
     action: int
     """Index of the action in the skeleton, from 0."""
     constraint: str
-    """Name of the constraint, such as ``reach`` or ``collision l_forearm_link tab2``."""
+    """What is violated, as a rule a term with its symbols: ``clear l_forearm_link tab2``."""
     violation: float
     """By how much, in m or rad; NaN where there is no amount (a sampling planner gave up)."""
     tried: str

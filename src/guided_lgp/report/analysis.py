@@ -22,7 +22,7 @@ from guided_lgp.logic import (
 from guided_lgp.scene import Scene
 
 BOX, HELD_BOX = "box", "held box"
-_BETWEEN = ("collision", "support")
+_BETWEEN = ("clear", "apart", "beside", "stand", "balanced")
 """Constraints of which the kinds of the two bodies matter."""
 
 
@@ -183,8 +183,8 @@ def failures(verdicts: pd.DataFrame, scenes: Mapping[str, Scene]) -> pd.DataFram
 def constraint_kind(constraint: str, scene: Scene) -> str:
     """A constraint without names of bodies.
 
-    ``collision l_forearm_link tab2`` becomes ``collision robot–table``, ``reach pr2L red`` becomes
-    ``reach``.
+    ``clear l_forearm_link tab2`` becomes ``clear robot–table``, ``hold pr2L red`` becomes
+    ``hold``.
     """
     kinds = {table.name: "table" for table in scene.tables} | {b.name: "box" for b in scene.boxes}
     kinds |= dict.fromkeys(scene.symbols.grippers, "robot")

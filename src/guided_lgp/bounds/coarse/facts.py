@@ -36,7 +36,7 @@ class Hold:
     """Whether the box may carry others: then their common centre is on the support, not its own."""
 
     def __str__(self) -> str:
-        return f"reach {self.gripper} {self.box}"
+        return f"hold {self.gripper} {self.box}"
 
 
 class Facts:

@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from guided_lgp.bounds.checks import body_names, overlap_name
 from guided_lgp.bounds.path.collision import CollisionChecker, PlanningScene
 from guided_lgp.bounds.path.connect import connect, shortcut
 from guided_lgp.bounds.path.spaces import (
@@ -92,8 +93,13 @@ class Mover:
         base, fixed = scene.robot.base_pose, scene.robot.fixed_values
         self.robot = scene.robot.description
         self.arms = {g: PlacedArm(self.robot, g, base, fixed) for g in self.robot.grippers}
+        self._bodies = body_names(scene)
         self._checker = CollisionChecker(scene)
         self._iterations = iterations
+
+    def name_of(self, pair: tuple[str, str]) -> str:
+        """The constraint that two bodies in collision violate."""
+        return overlap_name(*pair, self._bodies)
 
     @property
     def queries(self) -> int:
@@ -142,7 +148,7 @@ class Mover:
         if astray > _ASTRAY or turned_by > 10 * _ASTRAY:
             return "out of reach"
         blocked = self.collision(surroundings, path)
-        return path if blocked is None else f"collision {' '.join(blocked)}"
+        return path if blocked is None else self.name_of(blocked)
 
     def transit(
         self, surroundings: Surroundings, start: Array, goal: Array, rng: np.random.Generator

@@ -230,5 +230,5 @@ class Task:
         """Whether configurations (m, n) of the moving arm collide, and remember it."""
         pair = self.mover.collision(surroundings, q)
         if pair is not None:
-            self.record(index, stage, f"collision {' '.join(pair)} {where}")
+            self.record(index, stage, f"{self.mover.name_of(pair)} {where}")
         return pair is not None

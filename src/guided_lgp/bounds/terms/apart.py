@@ -47,7 +47,7 @@ def keep_apart(
         f"apart_{one.chain.name}_{two.chain.name}",
         (*joints, *others_joints),
         (one.side, two.side, *context.fixed, context.margins.apart),
-        ("collision", gripper, other),
+        ("apart", gripper, other),
         tuple(one.links[i] for i in one.chain.against_arms for _ in range(count)),
     )
 

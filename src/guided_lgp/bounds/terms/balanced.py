@@ -57,7 +57,7 @@ def _rows(context: Context, stack: tuple[str, ...], support: str) -> None:
         "balanced",
         (*context.pose[support].plane, *points),
         (*inner(context, support), *shares),
-        ("support", stack[0], support),
+        ("balanced", stack[0], support),
     )
 
 

@@ -87,7 +87,7 @@ def _separate(context: Context, name: str, other: str) -> None:
         "beside",
         (*first.plane, *second.plane, angle),
         (*halves, context.margins.beside),
-        ("overlap", name, other),
+        ("beside", name, other),
     )
     context.choose(Separation(angle, first, second, halves))
 

@@ -35,7 +35,7 @@ def keep_clear(context: Context, gripper: str, joints: tuple[int, ...], body: st
         f"clear_{arm.chain.name}",
         (*joints, *pose.plane, pose.z),
         (*context.arm_parameters(arm), pose.offset, *context.half(body), context.margins.clear),
-        ("collision", gripper, body),
+        ("clear", gripper, body),
         arm.links,
     )
 

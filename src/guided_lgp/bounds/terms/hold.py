@@ -155,7 +155,7 @@ def _rows(
         f"hold_{arm.chain.name}",
         (*joints, held.pitch, held.offset, *pose.plane, pose.z),
         (*context.arm_parameters(arm), pose.offset, up, *grasp),
-        ("reach", held.gripper, held.box),
+        ("hold", held.gripper, held.box),
     )
 
 

@@ -46,7 +46,7 @@ def _add(context: Context, gripper: str, box: str) -> None:
         f"pads_{context.robot.arms[gripper].chain.name}",
         (held.pitch, held.offset),
         (held.half_length, held.half_height, *inner),
-        ("grip", gripper, box),
+        ("pads", gripper, box),
     )
 
 

@@ -14,19 +14,27 @@ hulls bridge the hollow of the fingers: on a box that fills the hand they overla
 
 
 def grasp_faults(
-    box: str, size: Vector, placement: Pose, tool: Pose, palm_front: float
+    gripper: str, box: str, size: Vector, placement: Pose, tool: Pose, palm_front: float
 ) -> list[Violation]:
-    """Whether the gripper is at the box: closing across it, fingertips on it, palm outside.
+    """Whether the gripper holds the box: closing across it, fingertips on it, palm outside.
 
     Args:
+        gripper: its name.
         box: its name.
         size: its extents (m).
         placement: its pose.
         tool: pose of the gripper's tool frame.
         palm_front: x of the palm's front in the tool frame (m).
+
+    Returns:
+        The greater violation first.
     """
-    worst = max(hold.check(size, placement, tool, palm_front), pads.check(size, placement, tool))
-    return [Violation(f"grasp {box}", worst)] if worst > 0 else []
+    excess = {
+        "hold": hold.check(size, placement, tool, palm_front),
+        "pads": pads.check(size, placement, tool),
+    }
+    found = [Violation(f"{term} {gripper} {box}", e) for term, e in excess.items() if e > 0]
+    return sorted(found, key=lambda violation: -violation.amount)
 
 
 def placement_faults(
@@ -37,16 +45,11 @@ def placement_faults(
     found = []
     for box, below in support.items():
         top = top_of(scene, boxes, below)
-        tilt = max(stand.tilt(boxes[box]), stand.tilt(top.pose))
-        if tilt > stand.LEVEL_ANGLE:
-            found.append(Violation(f"level {box}", tilt))
-            continue
-        gap = stand.gap(sizes[box], boxes[box], top)
-        if gap > stand.HEIGHT:
-            found.append(Violation(f"height {box}", gap))
-        overhang = balanced.check(box, boxes, sizes, support, top)
-        if overhang > 0:
-            found.append(Violation(f"balance {box}", overhang))
+        excess = {
+            "stand": stand.check(sizes[box], boxes[box], top),
+            "balanced": balanced.check(box, boxes, sizes, support, top),
+        }
+        found += [Violation(f"{term} {box} {below}", e) for term, e in excess.items() if e > 0]
     return found
 
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from guided_lgp.bounds.checks import Violation, box_sizes
+from guided_lgp.bounds.checks import Violation, body_names, box_sizes, overlap_name
 from guided_lgp.bounds.results import Array, Keyframe
 from guided_lgp.bounds.terms import carried
 from guided_lgp.bounds.terms.carried import Relative, relative
@@ -51,10 +51,11 @@ def verify_keyframe(
         tools = world.tool_poses(gripper for _, gripper in held).tolist()
         for (box, gripper), tool in zip(held, tools, strict=True):
             palm_front = robot.arms[gripper].palm_front
-            violations += grasp_faults(box, sizes[box], boxes[box], tool, palm_front)
+            violations += grasp_faults(gripper, box, sizes[box], boxes[box], tool, palm_front)
     violations += placement_faults(world.scene, boxes, support)
+    bodies = body_names(world.scene)
     violations += [
-        Violation(f"collision {overlap.first} {overlap.second}", overlap.depth)
+        Violation(overlap_name(overlap.first, overlap.second, bodies), overlap.depth)
         for overlap in world.penetrations()
         if not declared(overlap, robot, held, support)
     ]
@@ -138,5 +139,5 @@ def _slips(last: _Frames, reached: _Frames, state: State) -> list[Violation]:
     for box, carrier in (*state.held, *state.support):
         amount = carried.check(last.relative(box, carrier), reached.relative(box, carrier))
         if amount > 0:
-            found.append(Violation(f"rigid {box}", amount))
+            found.append(Violation(f"carried {box} {carrier}", amount))
     return found

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from guided_lgp.bounds.checks import Violation, box_sizes
+from guided_lgp.bounds.checks import Violation, body_names, box_sizes, overlap_name
 from guided_lgp.bounds.results import Array, Attachment, Trajectory
 from guided_lgp.bounds.verify.geometry import declared, grasp_faults, placement_faults
 from guided_lgp.bounds.verify.keyframes import LIMIT_TOLERANCE
@@ -248,7 +248,7 @@ def _walk(
                 deepest = max(deepest, undeclared[0].depth)
             if undeclared and undeclared[0].depth > MARGIN:
                 worst = undeclared[0]
-                constraint = f"collision {worst.first} {worst.second}"
+                constraint = overlap_name(worst.first, worst.second, body_names(scene))
                 violation = Violation(constraint, worst.depth, time=float(phase.times[sample]))
         boxes, before = phase.boxes_at(-1), state
         if violation is None:
@@ -278,7 +278,7 @@ def _contact_faults(
         fault
         for box, gripper in dict.fromkeys((*before.held, *after.held))
         for fault in grasp_faults(
-            box, sizes[box], poses[box], tools[gripper].tolist(), arms[gripper].palm_front
+            gripper, box, sizes[box], poses[box], tools[gripper].tolist(), arms[gripper].palm_front
         )
     ]
     support = dict(before.support) | dict(after.support)
