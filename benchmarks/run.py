@@ -25,7 +25,7 @@ from guided_lgp.paths import METRICS
 from guided_lgp.report.benchmarks import PAGE, benchmark_page
 
 ROOT = Path(__file__).parents[1]
-PACKAGES = ("casadi", "pybullet", "pin", "coal", "toppra", "numpy", "torch")
+PACKAGES = ("casadi", "pybullet", "pin", "coal", "numpy", "torch")
 logger = logging.getLogger("benchmarks")
 
 

@@ -1,42 +1,32 @@
-"""From geometric paths to a trajectory: time-optimal within velocity and acceleration limits."""
+"""From geometric paths to a trajectory: time-optimal within velocity and acceleration limits.
 
-import logging
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
-from types import ModuleType
+This is time-optimal path parameterization by reachability analysis (TOPP-RA; Pham and Pham, 2018).
+With x the squared and u the half derivative of the squared path velocity, the limits at a grid
+point are |a_j u + b_j x| <= g_j, and x_i+1 = x_i + 2 (s_i+1 - s_i) u_i. A pass backwards finds the
+largest x_i from which the end can be reached at rest, a pass forwards takes the largest x_i+1.
+
+Both are linear programs in two variables. At the largest x two of their rows meet, one that keeps
+u below something and one that keeps it above; so x is the smallest of the numbers at which pairs of
+rows meet. All pairs but those with the row of the neighbour are the same whatever the neighbour's x
+is, and those with it are affine in it: a step of a pass is the minimum of a few affine functions.
+"""
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from guided_lgp.bounds.results import Array
 from guided_lgp.robots import Arm
-
-
-@contextmanager
-def _without_plots() -> Iterator[None]:
-    """Stand in for matplotlib while toppra is imported: it would load it, for plots, in 0.4 s."""
-    absent = {"matplotlib", "matplotlib.pyplot"} - sys.modules.keys()
-    sys.modules.update({name: ModuleType(name) for name in absent})
-    try:
-        yield
-    finally:
-        for name in absent:
-            del sys.modules[name]
-
-
-with _without_plots():
-    import toppra
-    import toppra.algorithm
-    import toppra.constraint
 
 INTERVAL = 0.05
 """Longest time (s) between two rows of a trajectory."""
 _SHARE = 0.97
 """Share of the limits that is used, so that the rounded rows keep them too."""
 _GRID_STEP = 0.04
-"""Distance (m of the arm's motion) of toppra's grid points."""
-
-logging.getLogger("toppra").setLevel(logging.ERROR)
+"""Distance (m of the arm's motion) of grid points."""
+_SLOWEST = 1e-10
+"""Squared path velocity (m^2/s^2) between the ends, at least: rounding must not bring a stop."""
+_STILL = 1e-10
+"""Derivative (rad/m) below which a joint does not move along the path."""
 
 
 def time_path(path: Array, arm: Arm) -> tuple[Array, Array]:
@@ -54,30 +44,67 @@ def time_path(path: Array, arm: Arm) -> tuple[Array, Array]:
     s = np.concatenate([[0.0], np.cumsum(lengths[lengths > 1e-9])])
     if len(path) == 1:
         return np.zeros(1), path
-    curve = toppra.SplineInterpolator(s, path, bc_type="natural")
-    velocity = _SHARE * arm.velocity_limits
-    acceleration = _SHARE * arm.acceleration_limits
-    instance = toppra.algorithm.TOPPRA(
-        [
-            toppra.constraint.JointVelocityConstraint(np.stack([-velocity, velocity], axis=1)),
-            toppra.constraint.JointAccelerationConstraint(
-                np.stack([-acceleration, acceleration], axis=1)
-            ),
-        ],
-        curve,
-        gridpoints=np.linspace(0.0, s[-1], max(10, int(s[-1] / _GRID_STEP))),
-        parametrizer="ParametrizeConstAccel",
-    )
-    trajectory = instance.compute_trajectory(0, 0)
-    count = 1 + int(np.ceil(trajectory.duration / INTERVAL))
-    times, step = np.linspace(0.0, trajectory.duration, count, retstep=True)
-    rows = np.asarray(trajectory(times))
+    curve = CubicSpline(s, path, bc_type="natural")
+    velocity, acceleration = _SHARE * arm.velocity_limits, _SHARE * arm.acceleration_limits
+    grid = np.linspace(0.0, s[-1], max(10, int(s[-1] / _GRID_STEP)))
+    speeds = np.sqrt(_fastest(grid, curve(grid, 1), curve(grid, 2), velocity, acceleration))
+    moments = np.concatenate([[0.0], np.cumsum(2 * np.diff(grid) / (speeds[1:] + speeds[:-1]))])
+    count = 1 + int(np.ceil(moments[-1] / INTERVAL))
+    times, step = np.linspace(0.0, moments[-1], count, retstep=True)
+    rows = np.asarray(curve(_along(grid, speeds, moments, times)))
     rows[0], rows[-1] = path[0], path[-1]
     return times * _stretch(rows, float(step), velocity, acceleration), rows
 
 
+def _fastest(
+    grid: Array, slopes: Array, bends: Array, velocity: Array, acceleration: Array
+) -> Array:
+    """The largest squared path velocities (N + 1,) from rest to rest.
+
+    Args:
+        grid: (N + 1,) path parameters.
+        slopes: (N + 1, n) first derivatives of the path.
+        bends: (N + 1, n) second derivatives.
+        velocity: (n,) limits (rad/s).
+        acceleration: (n,) limits (rad/s^2).
+    """
+    double = 2 * np.diff(grid)[:, None]
+    # The limits of a point hold at its neighbour, too, for the same u.
+    a = np.hstack([slopes[:-1], slopes[1:] + double * bends[1:]])
+    b = np.hstack([bends[:-1], bends[1:]])
+    g = np.tile(acceleration, 2)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        moves = np.abs(a) > _STILL
+        width = np.where(moves, g / np.abs(a), np.inf)  # of the interval of u at x = 0 ...
+        drift = np.where(moves, b / a, 0.0)  # ... which moves by this with x, downwards
+        at_rest = np.where(moves, np.inf, g / np.abs(b)).min(axis=1)
+        limits = (velocity / np.abs(slopes)).min(axis=1) ** 2
+        pairs = (width[:, :, None] + width[:, None, :]) / (drift[:, :, None] - drift[:, None, :])
+        stops = width / (drift - 1 / double)
+        offset, factor = double * width, 1 - double * drift
+        back, rest = 1 / factor, offset / factor
+    most = np.minimum(limits[:-1], at_rest)
+    most = np.minimum(most, np.where(pairs > 0, pairs, np.inf).min(axis=(1, 2)))
+    most = np.minimum(most, np.where(stops > 0, stops, np.inf).min(axis=1))
+    back, rest = np.where(factor > 0, back, 0.0), np.where(factor > 0, rest, np.inf)
+    x = np.zeros(len(grid))
+    for i in reversed(range(1, len(most))):
+        x[i] = min(most[i], (back[i] * x[i + 1] + rest[i]).min())
+    for i in range(len(most) - 1):
+        x[i + 1] = max(_SLOWEST, min(x[i + 1], (factor[i] * x[i] + offset[i]).min()))
+    return x
+
+
+def _along(grid: Array, speeds: Array, moments: Array, times: Array) -> Array:
+    """Path parameters at times: constant acceleration between grid points."""
+    i = np.clip(np.searchsorted(moments, times, side="right") - 1, 0, len(grid) - 2)
+    since, lasts = times - moments[i], moments[i + 1] - moments[i]
+    gain = (speeds[i + 1] - speeds[i]) / lasts
+    return np.asarray(grid[i] + since * (speeds[i] + 0.5 * since * gain))
+
+
 def _stretch(rows: Array, step: float, velocity: Array, acceleration: Array) -> float:
-    """The factor on time that keeps the limits between toppra's grid points, too.
+    """The factor on time that keeps the limits between grid points, too.
 
     Finite differences of rows (T, n) at equal steps (s), before and after at rest.
     """
