@@ -1,6 +1,6 @@
 """A robot from its file: the file's values, and what the description says besides."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TypeVar
 
@@ -86,7 +86,6 @@ def _arm(
     measures = _measures(arm, robot, description, tool_in_link)
     segments = arm.segments or measures.segments
     spheres = _spheres(arm, measures)
-    between = arm.spheres_between_arms
     signs = _signs(gripper, arm, robot, description, measures)
     return Arm(
         gripper=gripper,
@@ -111,7 +110,7 @@ def _arm(
         lever_arms=np.array(_stated(arm.lever_arms, lambda: measures.lever_arms)),
         reaches=np.array(_stated(arm.reaches, lambda: measures.reaches)),
         spheres=spheres,
-        spheres_between_arms=tuple(range(len(spheres))) if between is None else between,
+        spheres_between_arms=_stated(arm.spheres_between_arms, lambda: _largest(spheres)),
         fingers=_fingers(arm.fingers, measures, description, finger),
     )
 
@@ -186,6 +185,15 @@ def _fingers(
         grasp_width=_stated(stated.grasp_width, lambda: measures.grasp_width),
         gap=gap,
     )
+
+
+def _largest(spheres: Sequence[Sphere]) -> tuple[int, ...]:
+    """The largest sphere of every link."""
+    largest = {
+        sphere.link: number
+        for number, sphere in sorted(enumerate(spheres), key=lambda entry: entry[1].radius)
+    }
+    return tuple(sorted(largest.values()))
 
 
 def _spheres(arm: ArmDocument, measures: ArmMeasures) -> tuple[Sphere, ...]:

@@ -106,11 +106,10 @@ class Description:
         """
         text = self.source.read_text(encoding="utf-8")
         root = ET.fromstring(text)
-        (base,) = (link for link in self.links if link not in self.parents)
         for mesh in root.iter("mesh"):
             mesh.set("filename", str(self._resolved(mesh.get("filename", ""))))
         for link in root.iter("link"):
-            if link.find("inertial") is None and link.get("name") != base:
+            if link.find("inertial") is None:
                 inertial = ET.SubElement(link, "inertial")
                 ET.SubElement(inertial, "mass", value="0.001")
                 moments = {"ixx": "1e-6", "iyy": "1e-6", "izz": "1e-6"}

@@ -139,7 +139,7 @@ class ArmDocument(_Document):
     spheres: dict[str, tuple[tuple[Number, Number, Number, Length], ...]] | None = None
     """By link: centre in the link's frame, and radius. Derived: around the links' shapes."""
     spheres_between_arms: tuple[int, ...] | None = None
-    """Which of them stand for the arm against another arm. Derived: all."""
+    """Which of them stand for the arm against another arm. Derived: the largest of each link."""
 
     @model_validator(mode="before")
     @classmethod
