@@ -39,6 +39,13 @@ class Family:
 
 
 FAMILIES = {
+    "baxter": Family(
+        (
+            Table(name="tab1", position=(0.68, 0.30, -0.10), half_extents=(0.15, 0.20)),
+            Table(name="tab2", position=(0.68, -0.30, -0.10), half_extents=(0.15, 0.20)),
+        ),
+        (0.12, 0.04, 0.08),
+    ),
     "panda": Family(
         (
             Table(name="tab1", position=(0.50, 0.27, 0.15), half_extents=(0.15, 0.20)),
