@@ -19,7 +19,7 @@ from guided_lgp.errors import InputError, WorkerError
 ROOT = Path(__file__).parents[1]
 SCENE = ROOT / "examples" / "three_boxes.json"
 PLAN = ["plan", str(SCENE), "--goal", "(on red green)", "--planner", "breadth-first"]
-COMMANDS = [*cli.STAGES, "plan", "export", "view", "schema", "examples", "doctor", "mlflow"]
+COMMANDS = [*cli.STAGES, "plan", "export", "pddl", "view", "schema", "examples", "doctor", "mlflow"]
 
 
 def call(*arguments: str, cwd: Path = ROOT) -> subprocess.CompletedProcess[str]:

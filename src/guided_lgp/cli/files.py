@@ -1,4 +1,4 @@
-"""``examples``, ``export``, ``schema`` and ``view``: scenes and plans as files and pictures."""
+"""``examples export pddl schema view``: scenes and plans as files and pictures."""
 
 import json
 import shutil
@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from guided_lgp.cli.terminal import is_plan
+from guided_lgp.documents import write_text
 from guided_lgp.errors import InputError
 from guided_lgp.paths import EXAMPLES
 
@@ -58,6 +59,37 @@ def export(
 
     export_plan(read_plan(plan_file), out, speed)
     typer.echo(f"written: {out}")
+
+
+@app.command()
+def pddl(
+    scene: Annotated[
+        Path, typer.Argument(metavar="SCENE", help="JSON file with tables and boxes.")
+    ],
+    goal: Annotated[
+        list[str], typer.Option(metavar="GOAL", help="What must hold at the end; once for each.")
+    ],
+    folder: Annotated[
+        Path, typer.Option(metavar="FOLDER", help="Where domain.pddl and problem.pddl go.")
+    ] = Path(),
+) -> None:
+    """Write the symbolic part of a task in PDDL, for classical planners.
+
+    Example: guided-lgp pddl examples/three_boxes.json --goal "(on red green)"
+    """
+    from guided_lgp.logic import parse_objective, validate_objective
+    from guided_lgp.logic.pddl import domain_text, problem_text
+    from guided_lgp.scene import load_scene
+
+    start, objective = load_scene(scene), parse_objective(goal)
+    validate_objective(objective, start.symbols, start.state)
+    texts = {
+        "domain.pddl": domain_text(start.symbols.domain),
+        "problem.pddl": problem_text(start.state, objective, start.symbols),
+    }
+    for name, text in texts.items():
+        write_text(folder / name, text)
+        typer.echo(f"written: {folder / name}")
 
 
 class Format(StrEnum):
