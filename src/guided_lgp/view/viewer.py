@@ -121,6 +121,10 @@ class Viewer:
 
     def _add_tables_and_boxes(self) -> None:
         scene = self.server.scene
+        for column in self.scene.robot.columns:
+            length, width, height = (2 * half for half in column.half)
+            dimensions = (length, width, height)
+            scene.add_box("/column", _OTHER_TABLE, dimensions, **_pose(column.placement))
         for table in self.scene.tables:
             x, y, top = table.position
             scene.add_box(

@@ -58,15 +58,15 @@ class CollisionChecker:
         for joint in range(1, self._model.njoints):
             if self._model.parents[joint] == 0:
                 self._model.jointPlacements[joint] = base * self._model.jointPlacements[joint]
+        for column in scene.robot.columns:
+            sides = (2 * half for half in column.half)
+            self._add(column.name, 0, pin.XYZQUATToSE3(column.placement), coal.Box(*sides))
         for table in scene.tables:
             x, y, top = table.position
             centre = pose((x, y, top - TABLE_THICKNESS / 2), table.yaw)
-            sides = (
-                2 * table.half_extents[0],
-                2 * table.half_extents[1],
-                TABLE_THICKNESS,
-            )
-            self._add(table.name, 0, pin.XYZQUATToSE3(centre), coal.Box(*sides))
+            length, width = table.half_extents
+            slab = coal.Box(2 * length, 2 * width, TABLE_THICKNESS)
+            self._add(table.name, 0, pin.XYZQUATToSE3(centre), slab)
         for box in scene.boxes:
             self._add(box.name, 0, pin.XYZQUATToSE3(IDENTITY), coal.Box(*box.size))
         self._bodies: dict[str, list[int]] = {}
