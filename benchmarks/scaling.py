@@ -20,7 +20,7 @@ from guided_lgp.documents import write_json, written_whole
 from guided_lgp.experiments import enumerate_sequences
 from guided_lgp.logic import Objective, two_goal_objectives
 from guided_lgp.params import load_params
-from guided_lgp.paths import METRICS, PARAMS
+from guided_lgp.paths import DATASET, METRICS, PARAMS
 from guided_lgp.policy.paper.samples import build_dataset
 from guided_lgp.report.table import Table
 from guided_lgp.report.tables import number
@@ -60,7 +60,8 @@ def configurations() -> list[dict[str, float]]:
             objectives = two_goal_objectives(training.scenes[0].symbols)
             drawn = objectives[: params.build_dataset.training_objectives]
             build_s, dataset = _timed(partial(build_dataset, training.scenes, *written, drawn, 0))
-            dataset.save(root / "data" / "dataset")
+            dataset.save(root / DATASET)
+            samples = root / DATASET / "samples.safetensors"
             rows.append(
                 {
                     "configurations": count,
@@ -71,7 +72,7 @@ def configurations() -> list[dict[str, float]]:
                     "scene_bytes": (root / "data" / "scenes" / "training.json").stat().st_size,
                     "build_s": build_s,
                     "samples": len(dataset),
-                    "dataset_bytes": (root / "data" / "dataset" / "samples.npz").stat().st_size,
+                    "dataset_bytes": samples.stat().st_size,
                 }
             )
     return rows

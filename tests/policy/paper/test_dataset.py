@@ -1,5 +1,4 @@
 import json
-import zipfile
 from dataclasses import replace
 from itertools import permutations
 from pathlib import Path
@@ -298,7 +297,7 @@ def test_networks_share_the_samples_by_instruction(dataset: Dataset) -> None:
 def test_saved_twice_the_bytes_are_equal_and_come_back(dataset: Dataset, tmp_path: Path) -> None:
     for folder in ("one", "two"):
         dataset.save(tmp_path / folder)
-    for name in ("samples.npz", "dataset.json"):
+    for name in ("samples.safetensors", "dataset.json"):
         assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
     loaded = load_dataset(tmp_path / "one")
     for name, value in vars(dataset).items():
@@ -313,10 +312,10 @@ def test_missing_and_damaged_data_sets_name_the_stage(dataset: Dataset, tmp_path
     with pytest.raises(InputError, match=r"dataset\.json: .*build_dataset"):
         load_dataset(tmp_path)
     dataset.save(tmp_path)
-    samples = (tmp_path / "samples.npz").read_bytes()
+    samples = (tmp_path / "samples.safetensors").read_bytes()
     for damaged in (samples[:100], b"", b"text"):
-        (tmp_path / "samples.npz").write_bytes(damaged)
-        with pytest.raises(InputError, match=r"samples\.npz: .*build_dataset"):
+        (tmp_path / "samples.safetensors").write_bytes(damaged)
+        with pytest.raises(InputError, match=r"samples\.safetensors: .*build_dataset"):
             load_dataset(tmp_path)
     document = json.loads((tmp_path / "dataset.json").read_text())
     document["encoding"]["version"] = 99
@@ -342,30 +341,8 @@ def test_arrays_out_of_range_are_refused(
     array = getattr(dataset, name).copy()
     array[-1] = value
     replace(dataset, **{name: array}).save(tmp_path)
-    with pytest.raises(InputError, match=rf"samples\.npz: {name}: are .*build_dataset"):
+    with pytest.raises(InputError, match=rf"samples\.safetensors: {name}: are .*build_dataset"):
         load_dataset(tmp_path)
-
-
-def test_archives_that_cannot_be_unpacked_are_refused(dataset: Dataset, tmp_path: Path) -> None:
-    dataset.save(tmp_path)
-    path = tmp_path / "samples.npz"
-    archive = path.read_bytes()
-    entry = archive.index(b"PK\x01\x02")
-    with zipfile.ZipFile(path) as stored:
-        parts = {name: stored.read(name) for name in stored.namelist()}
-    for offset, value in ((8, 1), (10, 99)):  # encrypted; an unknown method
-        damaged = bytearray(archive)
-        damaged[entry + offset] = value
-        path.write_bytes(damaged)
-        with pytest.raises(InputError, match=r"samples\.npz: is damaged"):
-            load_dataset(tmp_path)
-    shape = str(dataset.states.shape).encode()
-    for other in (b"('a(b'# ", b"(99999999999999, 21)"):
-        with zipfile.ZipFile(path, "w") as archived:
-            for name, content in parts.items():
-                archived.writestr(name, content.replace(shape, other))
-        with pytest.raises(InputError, match=r"samples\.npz: is damaged"):
-            load_dataset(tmp_path)
 
 
 def test_tables_of_other_content_are_refused(

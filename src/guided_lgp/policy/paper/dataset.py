@@ -1,23 +1,22 @@
 """The training samples ((g, s_k), a_{k+1}) (paper, Sec. II and Appendix)."""
 
-import zlib
 from dataclasses import dataclass
 from pathlib import Path
-from tokenize import TokenError
-from typing import Any
-from zipfile import BadZipFile
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from guided_lgp.documents import read_json, write_json, written_whole
+from guided_lgp.documents import read_json, write_json
 from guided_lgp.errors import InputError
 from guided_lgp.logic import Objective, Symbols, parse_objective
 from guided_lgp.policy.arrays import FloatArray, IntArray
 from guided_lgp.policy.paper.encoding import VERSION, Encoding, in_files
 from guided_lgp.policy.paper.signature import INSTRUCTION
+from guided_lgp.policy.tensors import read_tensors, write_tensors
 
-_SAMPLES = "samples.npz"
+_SAMPLES = "samples.safetensors"
 _DOCUMENT = "dataset.json"
 _STAGE = "build_dataset"
 _REMEDY = f"the output of the stage {_STAGE}"
@@ -32,11 +31,20 @@ _ARRAYS = {
     "sample_goals": np.int32,
 }
 
-_DAMAGE = (
-    *(OSError, ValueError, KeyError, TypeError, AttributeError, EOFError, MemoryError),
-    *(BadZipFile, RuntimeError, zlib.error, TokenError),
-)
-"""What NumPy, zipfile and zlib raise for damaged archives."""
+
+class _Document(BaseModel):
+    """What the samples mean; the names of the symbols have the keys of their types."""
+
+    model_config = ConfigDict(strict=True, extra="allow")
+    __pydantic_extra__: dict[str, list[str]] = Field(init=False)
+
+    version: Literal[1]
+    samples: int
+    digest: str
+    """SHA-256 of the samples' file."""
+    objectives: list[list[str]]
+    configurations: list[str]
+    encoding: Any
 
 
 @dataclass(frozen=True)
@@ -111,12 +119,13 @@ class Dataset:
         return self.symbols.of(signature.variables[sub_policy].type.name)
 
     def save(self, directory: Path) -> None:
-        """Write ``samples.npz`` and ``dataset.json``; the same bytes for the same samples."""
-        with written_whole(directory / _SAMPLES) as unfinished:
-            np.savez_compressed(unfinished, **{name: getattr(self, name) for name in _ARRAYS})
+        """Write ``samples.safetensors`` and ``dataset.json``; same samples, same bytes."""
+        arrays = {name: getattr(self, name) for name in _ARRAYS}
+        digest = write_tensors(directory / _SAMPLES, arrays)
         document = {
             "version": VERSION,
             "samples": len(self),
+            "digest": digest,
             **_names_of(self.symbols, self.encoding),
             "objectives": [[str(goal) for goal in objective] for objective in self.objectives],
             "configurations": self.configurations,
@@ -132,26 +141,25 @@ def load_dataset(directory: Path) -> Dataset:
         InputError: a file is missing, damaged, or of another version.
     """
     path = directory / _DOCUMENT
-    document = read_json(path, _REMEDY)
-    stored = document.get("encoding") if isinstance(document, dict) else None
-    encoding = Encoding.parse(stored, str(path), _STAGE)
     try:
-        symbols = encoding.signature.domain.symbols(
-            **{kind: _names(document[in_files(kind)]) for kind, _ in encoding.slots}
-        )
-        objectives = tuple(parse_objective(_names(goals)) for goals in document["objectives"])
-        configurations = _names(document["configurations"])
-    except (KeyError, TypeError, ValueError) as error:
+        document = _Document.model_validate(read_json(path, _REMEDY))
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"]))
+        raise InputError(f"{path}: {where}", first["msg"].lower(), _REMEDY) from None
+    encoding = Encoding.parse(document.encoding, str(path), _STAGE)
+    own = document.__pydantic_extra__
+    names = {kind: own.get(in_files(kind), []) for kind, _ in encoding.slots}
+    try:
+        symbols = encoding.signature.domain.symbols(**names)
+        objectives = tuple(map(parse_objective, document.objectives))
+    except InputError as error:
         raise InputError(str(path), f"does not describe a data set: {error}", _REMEDY) from None
     if encoding.counts(symbols) != encoding.slots:
         raise InputError(str(path), "has other numbers of symbols than its encoding", _REMEDY)
+    configurations = tuple(document.configurations)
     path = directory / _SAMPLES
-    try:
-        with np.load(path, allow_pickle=False) as arrays:
-            samples = {name: arrays[name] for name in arrays.files}
-    except _DAMAGE as error:
-        fault = "is missing" if isinstance(error, FileNotFoundError) else f"is damaged: {error}"
-        raise InputError(str(path), fault, _REMEDY) from None
+    samples = read_tensors(path, _REMEDY, document.digest)
     wrong = _fault(samples, encoding, len(configurations))
     if wrong is not None:
         raise InputError(str(path), wrong, _REMEDY)
@@ -162,12 +170,6 @@ def _names_of(symbols: Symbols, encoding: Encoding) -> dict[str, tuple[str, ...]
     """The own symbols of each logic type, by what files call them."""
     signature = encoding.signature
     return {in_files(kind): signature.own(kind, symbols) for kind in signature.kinds}
-
-
-def _names(values: object) -> tuple[str, ...]:
-    if not isinstance(values, list) or not all(isinstance(value, str) for value in values):
-        raise TypeError("not a list of names")
-    return tuple(values)
 
 
 def _fault(samples: dict[str, Any], encoding: Encoding, configurations: int) -> str | None:

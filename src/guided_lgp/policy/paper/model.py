@@ -6,13 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from safetensors import SafetensorError
-from safetensors.numpy import load_file, save
 
-from guided_lgp.documents import read_json, write_json, written_whole
+from guided_lgp.documents import read_json, write_json
 from guided_lgp.errors import InputError
 from guided_lgp.policy.arrays import FloatArray
 from guided_lgp.policy.paper.encoding import VERSION, Encoding
+from guided_lgp.policy.tensors import read_tensors, write_tensors
 
 Layers = tuple[tuple[FloatArray, FloatArray], ...]
 """Weight (outputs, inputs) and bias (outputs,) of every layer of a sub-policy."""
@@ -46,8 +45,7 @@ class Model:
             "training": self.training,
             "encoding": self.encoding.document(),
         }
-        with written_whole(directory / f"{self.network}.safetensors") as unfinished:
-            unfinished.write_bytes(save(tensors))
+        write_tensors(directory / f"{self.network}.safetensors", tensors)
         write_json(directory / f"{self.network}.json", document)
 
 
@@ -73,12 +71,7 @@ def load_model(directory: Path, network: str, stage: str = "train_policy") -> Mo
     if sizes is None:
         raise InputError(f"{path}: sub_policies", "do not fit the network's chain", remedy)
     path = directory / f"{network}.safetensors"
-    try:
-        tensors = load_file(path)
-    except (OSError, SafetensorError, TypeError, AttributeError, ValueError) as error:
-        # The last three: a type of numbers that NumPy does not have, such as bfloat16.
-        fault = "is missing" if isinstance(error, FileNotFoundError) else "is damaged"
-        raise InputError(str(path), fault, remedy) from None
+    tensors = read_tensors(path, remedy)
     sub_policies = {}
     for name, widths in sizes.items():
         layers = []

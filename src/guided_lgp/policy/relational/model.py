@@ -8,16 +8,15 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
-from safetensors import SafetensorError
-from safetensors.numpy import load_file, save
 
-from guided_lgp.documents import read_json, write_json, written_whole
+from guided_lgp.documents import read_json, write_json
 from guided_lgp.domains import PAPER, load_domain
 from guided_lgp.errors import InputError
 from guided_lgp.logic import Domain
 from guided_lgp.policy.arrays import BoolArray, FloatArray
 from guided_lgp.policy.relational.encoding import EDGE_FEATURES, NODE_FEATURES, Graphs, Range
 from guided_lgp.policy.relational.heads import Head, heads
+from guided_lgp.policy.tensors import read_tensors, write_tensors
 
 VERSION = 1
 NAME = "relational"
@@ -164,8 +163,7 @@ class Model:
             "limits": asdict(self.weights.limits),
             "training": self.training,
         }
-        with written_whole(directory / f"{NAME}.safetensors") as unfinished:
-            unfinished.write_bytes(save(dict(self.weights.tensors)))
+        write_tensors(directory / f"{NAME}.safetensors", self.weights.tensors)
         write_json(directory / f"{NAME}.json", document)
 
 
@@ -216,11 +214,7 @@ def load_weights(directory: Path) -> Weights:
     limits = Range(tuple(document.limits.lower), tuple(document.limits.upper))
     domain = load_domain(document.domain)
     path = directory / f"{NAME}.safetensors"
-    try:
-        tensors = load_file(path)
-    except (OSError, SafetensorError) as error:
-        fault = "is missing" if isinstance(error, FileNotFoundError) else "is damaged"
-        raise InputError(str(path), fault, _REMEDY) from None
+    tensors = read_tensors(path, _REMEDY)
     expected = shapes(document.width, document.rounds, heads(domain))
     if {name: tensor.shape for name, tensor in tensors.items()} != expected:
         raise InputError(str(path), "does not have the weights that its JSON describes", _REMEDY)
