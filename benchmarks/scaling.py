@@ -22,8 +22,8 @@ from guided_lgp.logic import Objective, two_goal_objectives
 from guided_lgp.params import load_params
 from guided_lgp.paths import DATASET, METRICS, PARAMS
 from guided_lgp.policy.paper.samples import build_dataset
+from guided_lgp.report.cells import number
 from guided_lgp.report.table import Table
-from guided_lgp.report.tables import number
 from guided_lgp.scene import Scene, generate
 from guided_lgp.search.enumerate import enumerate_sequences as enumerate_scene
 from guided_lgp.search.tree import StateSpace

@@ -4,11 +4,11 @@ from pathlib import Path
 from typing import Any
 
 from guided_lgp.experiments.problems import PROBLEMS
-from guided_lgp.report import tables
+from guided_lgp.report.cells import NONE, number, percent, search_time, solved_suffix
 from guided_lgp.report.inputs import Metrics
+from guided_lgp.report.scalability_tables import label
 from guided_lgp.report.style import NETWORKS
 from guided_lgp.report.table import Table
-from guided_lgp.report.tables import NONE, number, percent, search_time, unless_all_solved
 from guided_lgp.search.planners import RIVALS, TABLE_3
 
 PAGE = Path("docs/benchmarks.md")
@@ -132,15 +132,14 @@ def _planners(metrics: Metrics) -> Table:
         if cells is None:
             continue
         bases = {planner: search_time(cells[planner]) for planner in _GUIDED}
-        row = [tables.label(problem), str(problem.k_min)]
+        row = [label(problem), str(problem.k_min)]
         row += [
-            f"{number(bases[planner], 3)}{unless_all_solved(cells[planner])}" for planner in _GUIDED
+            f"{number(bases[planner], 3)}{solved_suffix(cells[planner])}" for planner in _GUIDED
         ]
         for rival in rivals:
             theirs = search_time(cells[rival])
             row += [
-                _ratio(theirs, bases[planner]) + unless_all_solved(cells[rival])
-                for planner in _GUIDED
+                _ratio(theirs, bases[planner]) + solved_suffix(cells[rival]) for planner in _GUIDED
             ]
         rows.append(tuple(row))
     names = [TABLE_3[planner].label for planner in _GUIDED]

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from guided_lgp.experiments.problems import ProblemClass
 from guided_lgp.report import paper
 from guided_lgp.report.analysis import NEW, RENAMED, SEEN
+from guided_lgp.report.cells import number, percent, search_time
 from guided_lgp.report.inputs import Metrics, all_solved, compared
 from guided_lgp.report.style import POLICIES
-from guided_lgp.report.tables import number, percent, search_time
 from guided_lgp.search.planners import GUIDED, RIVALS, TABLE_1, TABLE_3
 
 AIM_SPEEDUP = 50

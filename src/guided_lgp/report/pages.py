@@ -12,11 +12,11 @@ from guided_lgp.documents import write_text
 from guided_lgp.errors import InputError
 from guided_lgp.paths import METRICS, REPORTS
 from guided_lgp.report import paper
-from guided_lgp.report.figures import STYLE, save
+from guided_lgp.report.cells import number, percent, search_time
+from guided_lgp.report.drawing import STYLE, save
 from guided_lgp.report.inputs import Metrics, all_solved, compared, read_object
 from guided_lgp.report.style import planner_style
 from guided_lgp.report.table import Table
-from guided_lgp.report.tables import number, percent, search_time
 from guided_lgp.search.planners import TABLE_3
 
 BEGIN = "<!-- findings: written by make repro -->"

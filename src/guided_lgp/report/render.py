@@ -15,8 +15,9 @@ from guided_lgp.logic import parse_skeleton
 from guided_lgp.params import BoundsParams, Params
 from guided_lgp.paths import METRICS, REPORTS
 from guided_lgp.policy.split import training_objectives
-from guided_lgp.report import analysis, figures, tables
+from guided_lgp.report import analysis, figures, scalability_figures, scalability_tables, tables
 from guided_lgp.report.contents import compose, sentences
+from guided_lgp.report.drawing import save
 from guided_lgp.report.inputs import Inputs, Metrics, compared, load_inputs
 from guided_lgp.report.table import Table
 from guided_lgp.search.planners import GUIDED, RIVALS, TABLE_3
@@ -62,7 +63,7 @@ def run(params: Params, root: Path) -> None:
     found = sentences(inputs, calls)
     write_text(reports / "tables" / "findings.md", found)
     for name, figure in _figures(inputs, params).items():
-        figures.save(figure, reports / "figures", name)
+        save(figure, reports / "figures", name)
     for setup in inputs.setups:
         scene = inputs.scenes[f"scalability_{setup}"].scenes[0]
         draw_scene(scene, reports / "figures" / f"setup_{setup}.png")
@@ -88,7 +89,7 @@ def _tables(inputs: Inputs, novelty: Mapping[str, str], calls: Mapping[str, floa
     return [
         tables.generalization(inputs.generalization, calls),
         tables.unseen(analysis.by_novelty(inputs.problems, novelty), novelty),
-        *tables.scalability(inputs.scalability, inputs.timing),
+        *scalability_tables.scalability(inputs.scalability, inputs.timing),
         tables.training(inputs.training),
         tables.enumeration(analysis.by_length(inputs.verdicts), rejected),
         *optional,
@@ -124,8 +125,8 @@ def _figures(inputs: Inputs, params: Params) -> Mapping[str, Figure]:
         matrices.setdefault(policy, {})[name] = counts
     limit = params.compare_scalability.max_tree_size
     return {
-        "headline": figures.headline(inputs.scalability, inputs.timing, limit),
-        "scalability": figures.scalability(inputs.scalability, inputs.timing, limit),
+        "headline": scalability_figures.headline(inputs.scalability, inputs.timing, limit),
+        "scalability": scalability_figures.scalability(inputs.scalability, inputs.timing, limit),
         "success": figures.success(analysis.outcomes(inputs.problems, scenes)),
         "learning_curves": figures.learning_curves(curves),
         "confusion": figures.confusion(matrices),

@@ -1,6 +1,5 @@
 """The tables of the report, each beside the paper's figures where the paper has any."""
 
-import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from statistics import fmean, stdev
@@ -8,16 +7,13 @@ from typing import Any
 
 import pandas as pd
 
-from guided_lgp.experiments.problems import ProblemClass
 from guided_lgp.report import paper
 from guided_lgp.report.analysis import NEW, RENAMED, SEEN
-from guided_lgp.report.inputs import Metrics, all_solved, compared
+from guided_lgp.report.cells import NONE, number, percent
+from guided_lgp.report.inputs import Metrics
 from guided_lgp.report.style import NETWORKS, POLICIES
 from guided_lgp.report.table import Table
-from guided_lgp.search.planners import TABLE_1, TABLE_3
-
-NONE = "–"
-"""Stands where there is no figure."""
+from guided_lgp.search.planners import TABLE_1
 
 _SHARES = {
     "shortest": "Shortest solution",
@@ -27,29 +23,6 @@ _SHARES = {
     "reattempt_max_depth": "Reattempts: depth",
 }
 _SUBSETS = ("all", "unseen")
-
-
-def percent(fraction: float | None) -> str:
-    """A fraction as a percentage with one decimal."""
-    return NONE if fraction is None or math.isnan(fraction) else f"{100 * fraction:.1f}%"
-
-
-def number(value: float | None, decimals: int = 1) -> str:
-    """A number with a fixed number of decimals and thin groups of thousands."""
-    return NONE if value is None or math.isnan(value) else f"{value:,.{decimals}f}"
-
-
-def spread(mean: float | None, std: float | None) -> str:
-    """Mean and standard deviation, both with as many decimals as fit the mean."""
-    if mean is None or math.isnan(mean):
-        return NONE
-    decimals = 2 if mean < 10 else 1 if mean < 1000 else 0
-    return f"{number(mean, decimals)} ± {number(std, decimals)}"
-
-
-def unless_all_solved(cell: Metrics) -> str:
-    """What follows a mean over a part of the problems: (k/n) for k of n solved."""
-    return "" if all_solved(cell) else f" ({cell['problems_solved']}/{cell['problems']})"
 
 
 def generalization(metrics: Metrics, calls: Mapping[str, float]) -> Table:
@@ -188,165 +161,6 @@ def unseen(shares: pd.DataFrame, novelty: Mapping[str, str]) -> Table:
         (("", 2), *((kind.capitalize(), 1) for kind in kinds)),
         labels=2,
         records=[dict(zip(shares.columns, row, strict=True)) for row in shares.to_numpy()],
-    )
-
-
-def scalability(metrics: Metrics, timing: Metrics) -> list[Table]:
-    """Table III: tree size and time of every planner beside the paper's, then the details.
-
-    Args:
-        metrics: by problem and planner.
-        timing: as ``metrics``.
-    """
-    return [
-        _comparison("tree_size", metrics, metrics),
-        _comparison("time", metrics, timing),
-        _details(metrics, timing),
-    ]
-
-
-def _planners(metrics: Metrics) -> list[str]:
-    return [name for name in TABLE_3 if any(name in row for row in metrics.values())]
-
-
-def label(problem: ProblemClass) -> str:
-    """The problem's name, starred as in the paper."""
-    return f"{problem.name}*" if problem.reduced else problem.name
-
-
-_QUANTITIES = {
-    "tree_size": ("Table III. Tree size (nodes)", "tree_size_mean", "tree_size_std"),
-    "time": ("Table III. Time to the first plan (s)", "time_mean_s", "time_std_s"),
-}
-
-
-def _comparison(quantity: str, metrics: Metrics, figures: Metrics) -> Table:
-    title, mean, std = _QUANTITIES[quantity]
-    problems = compared(metrics)
-    printed_n = {problem.name: str(problem.objectives) for problem in paper.PROBLEMS}
-    rows = [
-        ("Problems n", "paper", *(printed_n.get(problem.name, "") for problem in problems)),
-        ("Problems n", "ours", *(_count(metrics[problem.name]) for problem in problems)),
-    ]
-    records = []
-    for planner in _planners(metrics):
-        if planner in paper.PLANNERS:
-            cells = []
-            for problem in problems:
-                printed = paper.SCALABILITY.get(problem.name)
-                cell = (printed or {}).get(planner, {})
-                cells.append("" if printed is None else spread(cell.get(mean), cell.get(std)))
-                records.append(_record(problem, planner, "paper", cell.get(mean), cell.get(std)))
-            rows.append((TABLE_3[planner].label, "paper", *cells))
-        cells = []
-        for problem in problems:
-            cell = metrics[problem.name].get(planner)
-            if cell is None:
-                cells.append("")
-                continue
-            shown = figures[problem.name][planner]
-            cells.append(spread(shown[mean], shown[std]) + unless_all_solved(cell))
-            records.append(
-                _record(problem, planner, "ours", shown[mean], shown[std])
-                | {"n": cell["problems"], "solved": cell["problems_solved"]}
-            )
-        rows.append((TABLE_3[planner].label, "ours", *cells))
-    groups: dict[str, int] = {}
-    for problem in problems:
-        heading = f"K = {problem.k_min}"
-        groups[heading] = groups.get(heading, 0) + 1
-    return Table(
-        f"table_3_{quantity}",
-        title,
-        ("Planner", "Source", *map(label, problems)),
-        tuple(rows),
-        (
-            "Mean ± standard deviation over the problems solved. K: smallest number of actions. "
-            "n: problems given to each planner, objectives × configurations (one in the paper). "
-            f"(k/n): k of n solved. {NONE}: stopped at the limit of the tree size on at least one "
-            "problem, or none solved. *: reduced branching factor for planners without a policy, "
-            "as for the paper's breadth-first. Graph breadth-first merges equal states. Guided: "
-            "the paper's networks.",
-        ),
-        (("", 2), *groups.items()),
-        labels=2,
-        records=records,
-    )
-
-
-def _count(cells: Metrics) -> str:
-    return "/".join(map(str, sorted({cell["problems"] for cell in cells.values()})))
-
-
-def _record(
-    problem: ProblemClass, planner: str, source: str, mean: float | None, std: float | None
-) -> dict[str, object]:
-    return {
-        "problem": problem.name,
-        "k_min": problem.k_min,
-        "planner": planner,
-        "source": source,
-        "mean": mean,
-        "std": std,
-    }
-
-
-def search_time(times: Metrics) -> float | None:
-    """Mean time (s) of a search without the path bound: symbolic, policy and coarse."""
-    parts = [times[part] for part in ("symbolic_s", "policy_s", "coarse_s")]
-    return None if None in parts else float(sum(parts))
-
-
-def _details(metrics: Metrics, timing: Metrics) -> Table:
-    rows, records = [], []
-    parts = ("symbolic_s", "policy_s", "coarse_s", "path_s")
-    for problem in compared(metrics):
-        for planner in _planners(metrics):
-            cell = metrics[problem.name].get(planner)
-            if cell is None:
-                continue
-            times = timing[problem.name][planner]
-            rows.append(
-                (
-                    label(problem),
-                    TABLE_3[planner].label,
-                    f"{cell['problems_solved']}/{cell['problems']}",
-                    number(cell["plan_length_mean"]),
-                    number(cell["policy_calls_mean"]),
-                    number(cell["coarse_calls_mean"]),
-                    number(cell["path_calls_mean"]),
-                    *(number(times[part], 3) for part in parts),
-                    number(search_time(times), 3),
-                    number(times["peak_rss_mb"], 0),
-                )
-            )
-            records.append({"problem": problem.name, "planner": planner, **cell, **times})
-    return Table(
-        "table_3_details",
-        "Scalability in detail: plans, parts of the time, memory",
-        (
-            "Problem",
-            "Planner",
-            "Solved",
-            "Plan length",
-            "Policy calls",
-            "Coarse calls",
-            "Path calls",
-            "Symbolic (s)",
-            "Policy (s)",
-            "Coarse (s)",
-            "Path (s)",
-            "Without path (s)",
-            "Peak (MB)",
-        ),
-        tuple(rows),
-        (
-            "Means over the problems solved. Calls count whether or not the verdict was known from "
-            "another planner. Without path: symbolic, policy and coarse. Peak: resident memory of "
-            "the process, libraries included.",
-        ),
-        labels=2,
-        records=records,
     )
 
 
