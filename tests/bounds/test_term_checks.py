@@ -1,0 +1,199 @@
+"""Every term's kernel against its check, which shares no code with it, on random configurations."""
+
+import numpy as np
+import pytest
+
+from guided_lgp.bounds.checks import Top
+from guided_lgp.bounds.coarse.solver import default_solver
+from guided_lgp.bounds.program.grasp import tool_targets
+from guided_lgp.bounds.program.inverse import reaches
+from guided_lgp.bounds.program.kernels import SCALE
+from guided_lgp.bounds.program.kinematics import kinematics_of
+from guided_lgp.bounds.program.slots import HeldBox
+from guided_lgp.bounds.results import Array
+from guided_lgp.bounds.terms import balanced, carried, hold, kernel_table, pads, stand
+from guided_lgp.poses import compose, pose, quaternion
+from guided_lgp.scene import Box, PlacedRobot, Scene, Table
+from guided_lgp.scene.footprints import footprint, gap
+from guided_lgp.scene.world import World
+
+PLACED = PlacedRobot(base=(0.0, 0.0, 0.0))
+ROBOT = PLACED.description
+FIXED = tuple(PLACED.fixed_values.values())
+TABLE = kernel_table(kinematics_of(ROBOT))
+SIZE = (0.15, 0.07, 0.10)
+HALF_LENGTH, HALF_HEIGHT = 0.075, 0.05
+
+
+def residual(kernel: str, x: Array, p: Array) -> Array:
+    """Rows of a kernel, in m or rad."""
+    found = TABLE[TABLE.number[kernel]]
+    rows = np.array(found.residual(x, p)).ravel()
+    return np.concatenate([rows[: found.lengths] / SCALE, rows[found.lengths :]])
+
+
+def both_verdicts(verdicts: list[bool]) -> None:
+    """Neither is rare."""
+    assert 0.1 < np.mean(verdicts) < 0.9
+
+
+def held(gripper: str = "pr2L") -> HeldBox:
+    return HeldBox(gripper, "red", 0, 1, 0.0, HALF_LENGTH, HALF_HEIGHT)
+
+
+@pytest.mark.parametrize("gripper", ROBOT.grippers)
+def test_hold(gripper: str) -> None:
+    rng, verdicts = np.random.default_rng(0), []
+    arm = kinematics_of(ROBOT).arms[gripper]
+    reach = reaches(kinematics_of(ROBOT), FIXED, default_solver(ROBOT).reach)[gripper]
+    for _ in range(80):
+        place = np.array([0.55, 0.2 * arm.side, rng.uniform(-1.5, 1.5), rng.uniform(0.5, 0.8)])
+        pitch, offset = rng.uniform(0.4, 2.7), rng.uniform(-0.04, 0.04)
+        joints, missing = reach(
+            held(gripper), offset, place[None], np.array([pitch]), np.zeros((1, 2))
+        )
+        q = joints[0, 0, 0, np.argmin(missing[0, 0, 0])].copy()
+        q[rng.integers(7)] += rng.choice([0.0, 0.2])
+        grasp = (HALF_LENGTH, HALF_HEIGHT, 0.0, 0.0)
+        x = np.array([*q, pitch, offset, *place])
+        rows = residual("hold_0", x, np.array([arm.side, *FIXED, 0.0, 0.0, *grasp]))
+        whole = ROBOT.home.copy()
+        whole[arm.arm.slice] = arm.arm.signs * q
+        tool = PLACED.tool_pose(whole, gripper).tolist()
+        box = pose((place[0], place[1], place[3]), place[2]).tolist()
+        excess = hold.check(SIZE, box, tool, arm.chain.palm_front)
+        if np.abs(rows).max() < 1e-4:
+            assert excess < 0
+        if excess < 0:
+            assert np.abs(rows[3:6]).max() < 0.05  # any pitch is a grasp to the check
+        verdicts.append(excess < 0)
+    both_verdicts(verdicts)
+
+
+def test_pads() -> None:
+    rng, verdicts = np.random.default_rng(1), []
+    inner = (HALF_LENGTH - hold.PAD_MARGIN, HALF_HEIGHT - hold.PAD_MARGIN)
+    palm_front = ROBOT.arms["pr2L"].palm_front
+    for _ in range(200):
+        pitch, offset = rng.uniform(0.0, np.pi), rng.uniform(-0.09, 0.09)
+        rows = residual(
+            "pads_0", np.array([pitch, offset]), np.array([HALF_LENGTH, HALF_HEIGHT, *inner])
+        )
+        rotation, position = tool_targets(
+            held(), offset, np.zeros((1, 4)), np.array([pitch]), np.zeros((1, 2)), palm_front
+        )
+        tool = [*position[0, 0, 0], *quaternion(rotation[0, 0, 0])]
+        excess = pads.check(SIZE, pose((0.0, 0.0, 0.0)).tolist(), tool)
+        if rows.min() >= 0:
+            assert excess < 0
+        slack = hold.PAD_MARGIN - pads.GRASP_INSET
+        assert (excess < 0) == (rows[:4].min() > -slack)  # the first rows are the fingertips'
+        verdicts.append(excess < 0)
+    both_verdicts(verdicts)
+
+
+def test_balanced() -> None:
+    rng, verdicts = np.random.default_rng(2), []
+    sizes = {"red": SIZE, "green": (0.1, 0.06, 0.05), "blue": (0.05, 0.2, 0.2)}
+    masses = np.array([np.prod(size) for size in sizes.values()])
+    half = np.array([0.08, 0.12])
+    for _ in range(100):
+        support = np.array([*rng.uniform(-0.5, 0.5, 2), rng.uniform(-3, 3)])
+        points = support[:2] + rng.uniform(-0.12, 0.12, (3, 2))
+        unused = balanced.STACK - len(sizes)
+        x = np.array([*support, *points.ravel(), *np.zeros(2 * unused)])
+        shares = [*(masses / masses.sum()), *np.zeros(unused)]
+        rows = residual("balanced", x, np.array([*(half - balanced.BALANCE_INSET), *shares]))
+        boxes = {n: pose((*p, 0.7)).tolist() for n, p in zip(sizes, points, strict=True)}
+        on = {"red": "tab", "green": "red", "blue": "red"}
+        top = Top(pose((*support[:2], 0.6), support[2]).tolist(), half, 0.6)
+        excess = balanced.check("red", boxes, sizes, on, top)
+        assert excess == pytest.approx(-rows.min(), abs=1e-9)
+        verdicts.append(excess < 0)
+    both_verdicts(verdicts)
+
+
+def test_carried() -> None:
+    rng, verdicts = np.random.default_rng(3), []
+    for _ in range(100):
+        below, above, moved = rng.uniform(-1, 1, (3, 3))
+        turn = moved[2] - below[2]
+        cosine, sine = np.cos(turn), np.sin(turn)
+        x, y = above[:2] - below[:2]
+        after = np.array(
+            [moved[0] + cosine * x - sine * y, moved[1] + sine * x + cosine * y, above[2] + turn]
+        )
+        after += rng.choice([0.0, 0.02]) * rng.normal(size=3)
+        rows = residual("carried", np.concatenate([below, above, moved, after]), np.zeros(0))
+        frames = [pose((*p[:2], 0.0), p[2]).tolist() for p in (below, above, moved, after)]
+        excess = carried.check(
+            carried.relative(frames[1], frames[0]), carried.relative(frames[3], frames[2])
+        )
+        allowed = max(
+            np.hypot(*rows[:2]) - carried.RIGID_POSITION, abs(rows[2]) - carried.RIGID_ANGLE
+        )
+        assert excess == pytest.approx(allowed, abs=1e-6)
+        verdicts.append(excess < 0)
+    both_verdicts(verdicts)
+
+
+def test_stand() -> None:
+    rng, verdicts = np.random.default_rng(4), []
+    top = Top(pose((0.0, 0.0, 0.6), 0.3).tolist(), (0.2, 0.2), 0.6)
+    for _ in range(100):
+        raised, tilted = rng.choice([0.0, 0.02]), rng.choice([0.0, 0.1])
+        level = pose((0.1, 0.0, 0.6 + HALF_HEIGHT + raised), rng.uniform(-3, 3))
+        lean = np.array([0.0, 0.0, 0.0, np.sin(tilted / 2), 0.0, 0.0, np.cos(tilted / 2)])
+        excess = stand.check(SIZE, compose(level, lean).tolist(), top)
+        assert (excess < 0) == (raised == tilted == 0.0)
+        verdicts.append(excess < 0)
+    both_verdicts(verdicts)
+
+
+def test_beside() -> None:
+    """The best of all separating lines is the distance of the footprints where they overlap."""
+    rng, verdicts = np.random.default_rng(5), []
+    angles = np.linspace(0.0, 2 * np.pi, 721)
+    halves = (0.075, 0.035, 0.06, 0.05)
+    kernel = TABLE[TABLE.number["beside"]].residual.map(len(angles))
+    for _ in range(60):
+        first, second = (np.array([*rng.uniform(-0.1, 0.1, 2), rng.uniform(-3, 3)]) for _ in "12")
+        x = np.column_stack([np.tile([*first, *second], (len(angles), 1)), angles])
+        best = float(np.max(np.array(kernel(x.T, np.array([*halves, 0.0])))) / SCALE)
+        boxes = [
+            Box(name="b", size=(2 * hx, 2 * hy, 0.1), position=(*p[:2], 0.0), yaw=p[2], on="t")
+            for p, (hx, hy) in ((first, halves[:2]), (second, halves[2:]))
+        ]
+        distance = gap(*map(footprint, boxes))
+        if abs(distance) > 1e-3:
+            assert (best > 0) == (distance > 0)
+        verdicts.append(distance > 0)
+    both_verdicts(verdicts)
+
+
+def test_clear_and_apart() -> None:
+    """A few spheres stand for the hulls: they agree as a rule, as they only guide the solver."""
+    rng = np.random.default_rng(6)
+    verdicts: dict[str, list[tuple[bool, bool]]] = {"clear_0": [], "apart_0_0": []}
+    box = Box(name="red", size=(0.4, 0.4, 0.4), position=(0.6, 0.1, 0.9), on="tab")
+    table = Table(name="tab", position=(0.6, 0.1, 0.7), half_extents=(0.2, 0.2))
+    left, right = kinematics_of(ROBOT).arms.values()
+    mine = {*left.arm.links, *left.arm.hand_links}
+    others = {*right.arm.links, *right.arm.hand_links}
+    with World(Scene(tables=(table,), boxes=(box,))) as world:
+        for _ in range(300):
+            one, two = (rng.uniform(*np.array(arm.limits).T) for arm in (left, right))
+            world.set(np.concatenate([one, right.arm.signs * two]), {"red": pose(box.position)})
+            x = np.array([*one, *box.position[:2], 0.0, box.position[2]])
+            clear = residual("clear_0", x, np.array([1.0, *FIXED, 0.0, 0.2, 0.2, 0.2, 0.0]))
+            both = np.concatenate([one, two])
+            apart = residual("apart_0_0", both, np.array([1.0, -1.0, *FIXED, 0.0]))
+            touching = [overlap.bodies for overlap in world.penetrations()]
+            for kernel, rows, other in (("clear_0", clear, {"red"}), ("apart_0_0", apart, others)):
+                touch = any(bodies & mine and bodies & other for bodies in touching)
+                verdicts[kernel].append((rows.min() < 0, touch))
+    for kernel, seen in (("clear_0", 0.9), ("apart_0_0", 0.5)):  # between arms the spheres are few
+        spheres, hulls = np.array(verdicts[kernel]).T
+        assert np.mean(spheres[hulls]) > seen
+        assert np.mean(spheres[~hulls]) < 0.05
+        assert 0.1 < np.mean(hulls) < 0.9
