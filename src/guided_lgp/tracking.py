@@ -1,4 +1,4 @@
-"""MLflow: one parent run per pipeline execution, one child per stage (DESIGN §7).
+"""MLflow: one parent run per pipeline execution, one child per stage.
 
 A stage records itself when it has finished, from the files it has written: everything in its own
 run, and in the parent's what executions are compared by. What DVC restores from its cache is

@@ -1,4 +1,4 @@
-"""The scalability problems: counts and least numbers of actions (Table II, DESIGN §6)."""
+"""The scalability problems: counts and least numbers of actions (Table II)."""
 
 import pytest
 

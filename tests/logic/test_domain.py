@@ -1,4 +1,4 @@
-"""Level sizes of the logic tree and the permissive rules (DESIGN §2)."""
+"""Level sizes of the logic tree and the permissive rules."""
 
 import pytest
 from hypothesis import given

@@ -1,4 +1,4 @@
-"""Counts of objectives and the answers to bad ones (DESIGN §2)."""
+"""Counts of objectives and the answers to bad ones."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""The domain of DESIGN §2 in PDDL, written independently of the planners under test.
+"""The paper's domain in PDDL, written independently of the planners under test.
 
 Plain typed STRIPS. "The table does not stand, directly or through others, on the box" becomes one
 schema per way down from the table: the chain of boxes below it must end on a surface or in the

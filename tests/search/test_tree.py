@@ -1,4 +1,4 @@
-"""Level sizes, distances and cost of the logic tree (DESIGN §2)."""
+"""Level sizes, distances and cost of the logic tree."""
 
 import time
 

@@ -1,4 +1,4 @@
-"""Execution of a plan under gravity in PyBullet (DESIGN §4).
+"""Execution of a plan under gravity in PyBullet.
 
 Joints are driven by position control along the trajectory. A grasp becomes a fixed constraint
 between palm and box only if the simulated gripper really is at the simulated box at that moment;

@@ -1,4 +1,4 @@
-"""The file ``plan.json``: a plan that anyone can replay and check (DESIGN §7).
+"""The file ``plan.json``: a plan that anyone can replay and check.
 
 ``q`` rows follow ``joint_names``; a box is rigid in the tool frame of the attachment's gripper from
 ``start`` to ``end`` (indices into ``times``), so that box poses follow from the scene, the
@@ -144,7 +144,7 @@ def write_plan(
         scene: the initial configuration.
         objective: the goals that the plan achieves.
         result: a feasible result of the path bound.
-        statistics: tree size, attempts and times of the search, as DESIGN §7 names them.
+        statistics: tree size, attempts and times of the search.
         physics: outcome of the execution under gravity, if there was one.
 
     Raises:

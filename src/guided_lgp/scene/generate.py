@@ -1,4 +1,4 @@
-"""Random configurations of the setups (DESIGN §3)."""
+"""Random configurations of the setups."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

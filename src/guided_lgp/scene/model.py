@@ -1,4 +1,4 @@
-"""The scene document: robot, tables and boxes (DESIGN §3)."""
+"""The scene document: robot, tables and boxes."""
 
 import math
 from collections.abc import Sequence

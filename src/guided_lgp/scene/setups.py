@@ -1,7 +1,7 @@
 """The setups of the experiments: tables, trays, boxes and where they may start (paper, Fig. 4).
 
 The numbers are chosen so that every objective of setup a can be reached from nearly every
-configuration while a good part of the action sequences cannot be carried out (DESIGN §3).
+configuration while a good part of the action sequences cannot be carried out.
 """
 
 from dataclasses import dataclass
