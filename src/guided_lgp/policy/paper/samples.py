@@ -254,6 +254,7 @@ class _GoalCodes:
         self._recipe = recipe
         self._row: dict[bytes, int] = {}
         self._rows_in: dict[tuple[State, Slots], IntArray] = {}
+        self._bodies: dict[tuple[State, Objective], tuple[str | None, ...]] = {}
 
     def rows(self, paths: _Sequences) -> IntArray:
         """(steps, objectives, 4) the rows in ``codes`` of each objective at each step.
@@ -288,8 +289,10 @@ class _GoalCodes:
     def _code(self, goals: Objective, slots: Slots, state: State) -> int:
         if self._encoding.named_first:
             movable = self._encoding.signature.movable
-            chosen = self._encoding.fill(goals, state, self._symbols)
-            if chosen.of(movable) != slots.of(movable):
+            if (state, goals) not in self._bodies:
+                chosen = self._encoding.fill(goals, state, self._symbols)
+                self._bodies[state, goals] = chosen.of(movable)
+            if self._bodies[state, goals] != slots.of(movable):
                 return _NONE
         code = self._encoding.encode_goals(replace(slots, goals=goals), state)
         if code.tobytes() not in self._row:
