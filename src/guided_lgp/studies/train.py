@@ -56,8 +56,8 @@ def train(root: Path, name: str) -> None:
             root=root,
             directory=root / TRAINED / name / str(seed),
         )
+        for network in networks  # the instruction's first: it has all samples and takes longest
         for seed in study.seeds
-        for network in networks
     ]
     parallel.run(_train, tasks, params.parallel, f"training {name}")
 

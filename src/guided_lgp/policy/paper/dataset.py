@@ -2,17 +2,18 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import ValidationError
 
 from guided_lgp.documents import read_json, write_json
 from guided_lgp.errors import InputError
 from guided_lgp.logic import Objective, Symbols, parse_objective
 from guided_lgp.policy.arrays import FloatArray, IntArray
-from guided_lgp.policy.paper.encoding import VERSION, Encoding, in_files
+from guided_lgp.policy.paper.documents import DatasetDocument, in_files
+from guided_lgp.policy.paper.encoding import VERSION, Encoding
 from guided_lgp.policy.paper.signature import INSTRUCTION
 from guided_lgp.policy.tensors import read_tensors, write_tensors
 
@@ -30,21 +31,6 @@ _ARRAYS = {
     "sample_state": np.int32,
     "sample_goals": np.int32,
 }
-
-
-class _Document(BaseModel):
-    """What the samples mean; the names of the symbols have the keys of their types."""
-
-    model_config = ConfigDict(strict=True, extra="allow")
-    __pydantic_extra__: dict[str, list[str]] = Field(init=False)
-
-    version: Literal[1]
-    samples: int
-    digest: str
-    """SHA-256 of the samples' file."""
-    objectives: list[list[str]]
-    configurations: list[str]
-    encoding: Any
 
 
 @dataclass(frozen=True)
@@ -142,7 +128,7 @@ def load_dataset(directory: Path) -> Dataset:
     """
     path = directory / _DOCUMENT
     try:
-        document = _Document.model_validate(read_json(path, _REMEDY))
+        document = DatasetDocument.model_validate(read_json(path, _REMEDY))
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"]))

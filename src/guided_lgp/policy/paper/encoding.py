@@ -8,16 +8,17 @@ and actions into numbers once the slots are filled.
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import ValidationError
 
 from guided_lgp.domains import PAPER
 from guided_lgp.errors import InputError
 from guided_lgp.logic import Action, Objective, State, Symbols, satisfied, unsatisfied
 from guided_lgp.policy.arrays import FloatArray
+from guided_lgp.policy.paper.documents import EncodingDocument, in_files
 from guided_lgp.policy.paper.filling import Slots, fill, named, supports_first
 from guided_lgp.policy.paper.signature import INSTRUCTION, Signature
 
@@ -37,33 +38,6 @@ _FLAGS = {
     "symbolic_state": "meaning",
 }
 """The fields that are true or false, and their keys in files."""
-
-_IN_FILES = {"gripper": "grippers", "box": "boxes", "table": "surfaces"}
-"""What files call the slots of a type, where it is not its name."""
-
-
-class _Document(BaseModel):
-    """An encoding in a JSON file."""
-
-    model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
-
-    class Normalisation(BaseModel):
-        """Shift and scale of every coordinate."""
-
-        model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
-
-        centre: list[float]
-        scale: list[Annotated[float, Field(gt=0)]]
-
-    version: Literal[1]
-    domain: str = PAPER
-    slots: dict[str, Annotated[int, Field(ge=1, le=100)]]
-    chain: bool
-    named_first: bool
-    relative: bool
-    meaning: bool
-    normalisation: Normalisation
-    inputs: list[str]
 
 
 @dataclass(frozen=True)
@@ -367,7 +341,7 @@ class Encoding:
         """
         remedy = f"the encoding of version {VERSION}; run the stage {stage} again"
         try:
-            read = _Document.model_validate(document)
+            read = EncodingDocument.model_validate(document)
             encoding = cls(
                 domain=read.domain,
                 slots=_known_slots(read),
@@ -397,12 +371,7 @@ def _rows(members: Sequence[str | None]) -> dict[str, int]:
     return {name: row for row, name in enumerate(members) if name is not None}
 
 
-def in_files(kind: str) -> str:
-    """What files call the own symbols of a logic type."""
-    return _IN_FILES.get(kind, kind)
-
-
-def _known_slots(read: _Document) -> tuple[tuple[str, int], ...]:
+def _known_slots(read: EncodingDocument) -> tuple[tuple[str, int], ...]:
     """The slots that a file names, in the order of the domain's types."""
     kinds = Signature.of(read.domain).kinds
     return tuple((kind, read.slots[in_files(kind)]) for kind in kinds)

@@ -28,7 +28,8 @@ from guided_lgp.logic import (
 from guided_lgp.params import SampleRecipe
 from guided_lgp.policy.arrays import BoolArray, FloatArray, IntArray
 from guided_lgp.policy.paper.dataset import Dataset
-from guided_lgp.policy.paper.encoding import Encoding, in_files
+from guided_lgp.policy.paper.documents import in_files
+from guided_lgp.policy.paper.encoding import Encoding
 from guided_lgp.policy.paper.filling import Slots
 from guided_lgp.scene import Scene
 
