@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from guided_lgp.poses import Array
+from guided_lgp.poses import IDENTITY, Array
 from guided_lgp.robots.description import Description
 from guided_lgp.robots.document import FixedJoint, OffsetShoulderDocument
 from guided_lgp.robots.kinematics import Kinematics
@@ -147,6 +147,11 @@ class Arm:
     spheres_between_arms: tuple[int, ...]
     """Indices of those that stand for the arm against another arm."""
     fingers: Fingers
+
+    @cached_property
+    def tool_is_link(self) -> bool:
+        """Whether the tool frame is the frame of its link."""
+        return np.array_equal(self.tool_in_link, IDENTITY)
 
 
 @dataclass(frozen=True, eq=False)
