@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import up_fast_downward
 
+from guided_lgp.cli import main
 from guided_lgp.domains import domain_names, load_domain
 from guided_lgp.errors import InputError
 from guided_lgp.logic import (
@@ -81,6 +82,17 @@ def test_a_plan_with_hand_overs_is_read(tmp_path: Path) -> None:
     symbols = symbols_of("handover")
     text = "(grasp pr2l red)\n(take pr2r pr2l red) ; comment\n; cost = 2 (unit cost)\n"
     assert read_plan(text, symbols) == parse_skeleton("(grasp pr2L red) (take pr2R pr2L red)")
+
+
+def test_the_command_writes_both_files(tmp_path: Path) -> None:
+    scene = Path(__file__).parents[2] / "examples/three_boxes.json"
+    goals = ["--goal", "(on red green)", "--goal", "(held blue)"]
+    with pytest.raises(SystemExit) as ended:
+        main(["pddl", str(scene), *goals, "--folder", str(tmp_path)])
+    assert not ended.value.code
+    assert (tmp_path / "domain.pddl").read_text() == domain_text(load_domain())
+    problem = (tmp_path / "problem.pddl").read_text()
+    assert "(:goal (and (on red green) (held blue)))" in problem
 
 
 @pytest.mark.parametrize(
