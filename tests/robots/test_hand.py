@@ -26,6 +26,7 @@ _PANDA_JOINTS = ["panda_finger_joint1", "panda_finger_joint2"]
 
 def pr2_hand() -> HandShape:
     return measure_hand(
+        "arm",
         _PR2,
         ("l_gripper_tool_frame", np.eye(3), np.zeros(3)),
         _PR2_LINKS,
@@ -36,6 +37,7 @@ def pr2_hand() -> HandShape:
 
 def panda_hand() -> HandShape:
     return measure_hand(
+        "arm",
         _PANDA,
         ("panda_hand_tcp", _FROM_Z, np.zeros(3)),
         ["panda_hand", "panda_leftfinger", "panda_rightfinger"],
@@ -94,12 +96,14 @@ def test_palms_are_where_the_descriptions_say() -> None:
 def test_jaws_that_do_not_move_have_one_gap() -> None:
     urdf = plain("ur_description/urdf/ur5_gripper.urdf")
     axes = np.array([[0.0, 1, 0], [0, 0, 1], [1, 0, 0]])  # approach z, closing x
-    hand = measure_hand(urdf, ("tool0", axes, np.array([0, 0, 0.055])), ["tool0"], {}, (0.0, 0.0))
+    hand = measure_hand(
+        "arm", urdf, ("tool0", axes, np.array([0, 0, 0.055])), ["tool0"], {}, (0.0, 0.0)
+    )
     assert hand.gap(0.0) == pytest.approx(0.055)
     assert hand.palm_front == pytest.approx(0.0125 - 0.055)
 
 
 def test_a_hand_without_fingers_is_refused() -> None:
     tool = ("panda_hand_tcp", _FROM_Z, np.zeros(3))
-    with pytest.raises(InputError, match="hand links panda_hand"):
-        measure_hand(_PANDA, tool, ["panda_hand"], {}, (0.0, 0.0))
+    with pytest.raises(InputError, match=r"arm.hand_links: panda_hand"):
+        measure_hand("arm", _PANDA, tool, ["panda_hand"], {}, (0.0, 0.0))

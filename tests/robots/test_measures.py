@@ -48,6 +48,7 @@ def below(arm: ArmDescription) -> list[str]:
 def measures(name: str) -> ArmMeasures:
     arm, (rotation, hand, fingers, limits) = ARMS[name], _HANDS[name]
     return ArmMeasures(
+        where="arm",
         urdf=arm.urdf,
         root=arm.root,
         joints=tuple(arm.joints),

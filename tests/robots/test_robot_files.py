@@ -95,3 +95,26 @@ def test_soft_limits_count_unless_the_file_says_otherwise(tmp_path: Path) -> Non
     left = load_robot(str(file)).arms["pr2L"]
     assert left.limits[0].tolist() == [-0.564601836603, 2.1353981634]
     assert load_robot("pr2").arms["pr2L"].limits[0].tolist() == [-0.714601836603, 2.2853981634]
+
+
+_JOINTS = ("shoulder_lift", "shoulder_pan", "upper_arm_roll", "elbow_flex")
+_WRIST = ("forearm_roll", "wrist_flex", "wrist_roll")
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"redundant": None}, r"an arm of 7 joints, redundant: none \(six joints, or seven"),
+        ({"hand_links": ["l_gripper_palm_link"], "spheres": None}, r"pr2L.hand_links: l_gripper"),
+        (
+            {"joints": [f"<side>_{joint}_joint" for joint in (*_JOINTS, *_WRIST)]},
+            "do not carry l_gripper_tool_frame one after the other",
+        ),
+    ],
+)
+def test_faults_of_an_arm_are_told_in_one_line(
+    tmp_path: Path, fields: dict[str, object], message: str
+) -> None:
+    file = changed(tmp_path, "pr2", "pr2L", **fields)
+    with pytest.raises(InputError, match=message):
+        load_robot(str(file))

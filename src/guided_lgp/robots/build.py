@@ -65,6 +65,7 @@ def _check(document: RobotDocument, description: Description) -> None:
         description.require_joints(f"{where}.joints", *arm.joints)
         description.require_joints(f"{where}.fingers.joints", *arm.fingers.joints)
         description.require_links(f"{where}.tool.link", arm.tool.link)
+        description.require_chain(f"{where}.joints", arm.joints, arm.tool.link)
         description.require_links(f"{where}.hand_links", *arm.hand_links)
         if arm.segments is not None:
             description.require_links(f"{where}.segments.ends", *arm.segments.ends)
@@ -83,7 +84,7 @@ def _arm(
     joints = [description.joints[name] for name in arm.joints]
     velocity = np.array([joint.velocity for joint in joints])
     tool_in_link = _tool_in_link(arm.tool, description.where, gripper)
-    measures = _measures(arm, robot, description, tool_in_link)
+    measures = _measures(gripper, arm, robot, description, tool_in_link)
     segments = arm.segments or measures.segments
     spheres = _spheres(arm, measures)
     signs = _signs(gripper, arm, robot, description, measures)
@@ -121,10 +122,15 @@ def _stated(value: T | None, derived: Callable[[], T]) -> T:
 
 
 def _measures(
-    arm: ArmDocument, robot: RobotDocument, description: Description, tool_in_link: Array
+    gripper: str,
+    arm: ArmDocument,
+    robot: RobotDocument,
+    description: Description,
+    tool_in_link: Array,
 ) -> ArmMeasures:
     moved = description.solid_links_below(arm.joints[0])
     return ArmMeasures(
+        where=f"{description.where}: arms.{gripper}",
         urdf=description.urdf,
         root=robot.base_link,
         joints=arm.joints,
@@ -150,7 +156,8 @@ def _signs(
         return np.array(arm.signs, float)
     original = robot.arms[arm.mirrors]
     tool = _tool_in_link(original.tool, description.where, arm.mirrors)
-    mirror = mirror_of(_measures(original, robot, description, tool).chain, measures.chain)
+    mirrored = _measures(arm.mirrors, original, robot, description, tool)
+    mirror = mirror_of(mirrored.chain, measures.chain)
     if mirror is None or mirror.error > _MIRROR_ERROR:
         where = f"{description.where}: arms.{gripper}.mirrors"
         raise InputError(where, f"is no mirror image of {arm.mirrors}", "an arm of its own")

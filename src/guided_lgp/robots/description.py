@@ -4,7 +4,7 @@ import json
 import os
 import tempfile
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cached_property
@@ -174,6 +174,23 @@ class Description:
                 accepted = _similar(joint, tuple(self.joints))
                 fault = f"{joint} is no joint that moves"
                 raise InputError(f"{self.where}: {field}", fault, accepted)
+
+    def require_chain(self, field: str, joints: Sequence[str], link: str) -> None:
+        """Check that joints carry a link, in their order from the root.
+
+        Raises:
+            InputError: they do not.
+        """
+        carrier = {child: joint for joint, child in self.children.items()}
+        way = []
+        above = link
+        while above in self.parents:
+            way.append(carrier[above])
+            above = self.parents[above]
+        turning = [joint for joint in reversed(way) if joint in self.joints]
+        if [joint for joint in turning if joint in joints] != list(joints):
+            fault = f"{', '.join(joints)} do not carry {link} one after the other"
+            raise InputError(f"{self.where}: {field}", fault, ", ".join(turning))
 
     def solid_links_below(self, joint: str) -> tuple[str, ...]:
         """Links with collision geometry that a joint moves."""

@@ -153,6 +153,11 @@ class ArmDocument(_Document):
             values = getattr(self, field)
             if values and len(values) != len(self.joints):
                 raise ValueError(f"{field} has {len(values)} values for {len(self.joints)} joints")
+        if len(self.fingers.ratios) not in (0, len(self.fingers.joints)):
+            raise ValueError(f"fingers have {len(self.fingers.ratios)} ratios for their joints")
+        if len(self.joints) != 6 + (self.redundant is not None):
+            fault = f"an arm of {len(self.joints)} joints, redundant: {self.redundant or 'none'}"
+            raise ValueError(f"{fault} (six joints, or seven with a redundant one)")
         if self.redundant is not None and self.redundant not in self.joints:
             accepted = ", ".join(self.joints)
             raise ValueError(f"redundant {self.redundant} is no joint of the arm ({accepted})")

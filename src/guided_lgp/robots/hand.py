@@ -53,6 +53,7 @@ class HandShape:
 
 
 def measure_hand(
+    where: str,
     urdf: Path,
     tool: tuple[str, Array, Array],
     links: Sequence[str],
@@ -62,6 +63,7 @@ def measure_hand(
     """Measure a hand on the hulls of its shapes.
 
     Args:
+        where: file and field of the arm, for messages.
         urdf: the description's file.
         tool: link, and rotation (3, 3) and position (3,) of the tool frame in it.
         links: palm and fingers.
@@ -78,7 +80,7 @@ def measure_hand(
     sides = [_side(shape) for shape in widest]
     if set(sides) != {-1, 0, 1}:
         accepted = "a palm and a finger on either side of the tool frame's plane y = 0"
-        raise InputError("robot", f"hand links {', '.join(links)}", accepted)
+        raise InputError(f"{where}.hand_links", ", ".join(links), accepted)
     palm = max(shape[:, 0].max() for shape, side in zip(widest, sides, strict=True) if side == 0)
     values = np.linspace(closed, opened, _STEPS) if fingers else np.array([opened])
     shapes = [hand.shapes(value) for value in values]

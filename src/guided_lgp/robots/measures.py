@@ -33,6 +33,8 @@ class SegmentMeasures:
 class ArmMeasures:
     """What a URDF tells about one arm."""
 
+    where: str
+    """File and field of the arm, for messages."""
     urdf: Path
     """Ready for pinocchio, with plain paths of meshes."""
     root: str
@@ -55,7 +57,9 @@ class ArmMeasures:
     @cached_property
     def hand(self) -> HandShape:
         """Palm and fingers."""
-        return measure_hand(self.urdf, self.tool, self.hand_links, self.fingers, self.finger_limits)
+        return measure_hand(
+            self.where, self.urdf, self.tool, self.hand_links, self.fingers, self.finger_limits
+        )
 
     @property
     def grasp_width(self) -> float:
