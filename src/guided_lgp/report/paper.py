@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from guided_lgp.search.planners import TABLE_3
+
 
 @dataclass(frozen=True)
 class Problem:
@@ -76,7 +78,7 @@ def _cell(time_mean: float, time_std: float, tree_mean: float, tree_std: float) 
     }
 
 
-PLANNERS = ("breadth_first", "guided")
+PLANNERS = tuple(name for name, planner in TABLE_3.items() if planner.printed)
 """The planners of Table III, under our names."""
 
 SCALABILITY: dict[str, dict[str, dict[str, float]]] = {

@@ -72,6 +72,8 @@ class Planner:
     """Its key in Table I, if it takes part in the test of generalization."""
     table_3: bool = True
     """Whether it takes part in the comparison of scalability."""
+    printed: bool = False
+    """Whether the paper has figures for it there."""
     color: str | None = None
     """If it is not that of its policy."""
     marker: str = "D"
@@ -114,6 +116,7 @@ def _greedy(name: str, label: str, policy: str, table_1: str) -> Planner:
         search="guided",
         policy=policy,
         table_1=table_1,
+        printed=policy == "paper",
         marker="o",
         linestyle="--",
     )
@@ -130,6 +133,7 @@ PLANNERS: Mapping[str, Planner] = {
             name="breadth_first",
             label="Breadth-first",
             search="breadth-first",
+            printed=True,
             color="#333333",
             marker="s",
         ),

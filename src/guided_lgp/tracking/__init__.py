@@ -1,0 +1,33 @@
+"""MLflow: one parent run per pipeline execution, one child per stage.
+
+A stage records itself when it has finished, from the files it has written: everything in its own
+run, and in the parent's what executions are compared by. What DVC restores from its cache is
+recorded by :func:`sync` from the same files. Every child carries a key made of all that determines
+the stage's results, so what has been recorded is not recorded again. Results never depend on
+tracking: its failures become a warning.
+"""
+
+from guided_lgp.tracking.database import (
+    EXPERIMENT,
+    KEY_TAG,
+    STAGE_TAG,
+    prepare,
+    repository,
+    tracking_uri,
+)
+from guided_lgp.tracking.metrics import COMPARED, DETAILS, flatten
+from guided_lgp.tracking.runs import recorded, sync
+
+__all__ = [
+    "COMPARED",
+    "DETAILS",
+    "EXPERIMENT",
+    "KEY_TAG",
+    "STAGE_TAG",
+    "flatten",
+    "prepare",
+    "recorded",
+    "repository",
+    "sync",
+    "tracking_uri",
+]

@@ -1,0 +1,73 @@
+"""A stage as DVC knows it: what it depends on and what it has written."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from hashlib import md5, sha256
+from pathlib import Path
+from typing import Any
+
+from guided_lgp.errors import InputError
+from guided_lgp.params import Params
+from guided_lgp.paths import PARAMS
+from guided_lgp.tracking.metrics import flatten
+
+
+@dataclass(frozen=True)
+class StageFiles:
+    """A stage as ``dvc.lock`` describes it."""
+
+    address: str
+    """Name in dvc.yaml, such as ``train_policy@place``."""
+    key: str
+    """Hash of the command, the dependencies and the parameters."""
+    dependencies: tuple[str, ...]
+    outputs: Mapping[str, str | None]
+    """Paths with their md5, where known."""
+    parameters: Mapping[str, Any]
+    """Values by dotted name."""
+
+    @classmethod
+    def of(cls, address: str, entry: Mapping[str, Any]) -> "StageFiles":
+        """Read the entry of one stage in ``dvc.lock``."""
+        dependencies = {item["path"]: item.get("md5") for item in entry.get("deps", ())}
+        determinants = [address, entry["cmd"], dependencies, entry.get("params", {})]
+        text = json.dumps(determinants, sort_keys=True)
+        return cls(
+            address=address,
+            key=sha256(text.encode()).hexdigest(),
+            dependencies=tuple(sorted(dependencies)),
+            outputs={item["path"]: item.get("md5") for item in entry.get("outs", ())},
+            parameters=entry.get("params", {}).get(PARAMS.name, {}),
+        )
+
+
+def running_stage(address: str) -> StageFiles:
+    """The running stage as DVC is about to write it to ``dvc.lock``."""
+    from dvc.repo import Repo
+    from dvc.stage.serialize import to_single_stage_lockfile
+
+    with Repo() as repo:
+        stage = repo.stage.load_one(name=address)
+        stage.save_deps()
+        return StageFiles.of(address, to_single_stage_lockfile(stage))
+
+
+def check_parameters(stage: StageFiles, params: Params) -> None:
+    """Raise :class:`InputError` if a stage ran with other parameters."""
+    current = flatten(params.model_dump())
+    for name, value in flatten(stage.parameters).items():
+        if current.get(name) != value:
+            fault = f"is not {value!r}, with which {stage.address} ran"
+            raise InputError(f"{PARAMS}: {name}", fault, "dvc repro first")
+
+
+def check_outputs(stage: StageFiles) -> None:
+    """Raise :class:`InputError` if an output is not the one that the stage made."""
+    for path, expected in stage.outputs.items():
+        file = Path(path)
+        if not file.exists():
+            raise InputError(path, f"missing, made by the stage {stage.address}", "dvc repro first")
+        recorded = file.is_file() and file.parts[0] != "data"
+        if recorded and expected not in (None, md5(file.read_bytes()).hexdigest()):
+            raise InputError(path, "is not the one that dvc.lock names", "dvc repro first")
