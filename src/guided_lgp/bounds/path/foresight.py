@@ -168,7 +168,7 @@ class Foresight:
             rotation, ends, reach.redundancies[value] + np.array(task.shifts(holder))
         )
         if not valid[..., branch].any():
-            task.record(later, Stage.OFF, "way out out of reach")
+            task.record(later, Stage.OFF, "out of reach on the way out")
         around = left.around(holder)
         return not all(
             task.blocked(later, Stage.LEFT, "after the contact", around, end[None])
