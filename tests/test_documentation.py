@@ -1,7 +1,9 @@
 """README and documentation: every command runs as written, the site builds without a warning."""
 
+import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -16,6 +18,7 @@ PAGES = sorted(
     for page in (ROOT / "README.md", *(ROOT / "docs").glob("*.md"))
     if re.search(r"^guided-lgp ", page.read_text(encoding="utf-8"), flags=re.MULTILINE)
 )
+NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
 SERVER = "guided-lgp view"
 """A command that serves until it is interrupted."""
 ENVIRONMENT = os.environ | {
@@ -97,3 +100,14 @@ def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
     )
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "schemas" / "scene.schema.json").is_file()
+
+
+@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda file: file.stem)
+def test_notebooks_run(notebook: Path, tmp_path: Path) -> None:
+    (tmp_path / "tests").mkdir()
+    shutil.copy(ROOT / "tests" / "params.yaml", tmp_path / "tests")
+    cells = json.loads(notebook.read_text(encoding="utf-8"))["cells"]
+    assert all(not cell.get("outputs") for cell in cells)
+    code = ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
+    (tmp_path / "script.py").write_text("\n".join(code))
+    run("python script.py", tmp_path)
