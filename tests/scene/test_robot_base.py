@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from guided_lgp.errors import InputError
+from guided_lgp.poses import apply, pose
 from guided_lgp.scene import Scene, parse_scene
+from guided_lgp.scene.bullet import pybullet
 from guided_lgp.scene.validate import validate_scene
 from guided_lgp.scene.world import World
 
@@ -85,3 +87,22 @@ def test_the_document_names_the_height_only_of_a_raised_robot() -> None:
 def test_a_fault_of_the_robot_is_named(robot: dict[str, Any], fault: str) -> None:
     with pytest.raises(InputError, match=fault):
         raised(**robot)
+
+
+def test_every_shape_of_a_link_collides() -> None:
+    """The Panda's fingers have several shapes each: a crumb in any of them is found."""
+    scene = raised()
+    crumbs = [box.model_copy(update={"size": (0.004, 0.004, 0.004)}) for box in scene.boxes]
+    scene = scene.model_copy(update={"boxes": tuple(crumbs)})
+    home = scene.robot.description.home
+    with World(scene) as world:
+        for finger in ("panda_leftfinger", "panda_rightfinger"):
+            part = world.robot, world.links[finger]
+            shapes = pybullet.getCollisionShapeData(*part, physicsClientId=world.client)
+            state = pybullet.getLinkState(*part, physicsClientId=world.client)
+            mass = np.array([*state[0], *state[1]])
+            assert len(shapes) > 1
+            for shape in shapes:  # each is placed in the frame of the link's centre of mass
+                world.set(home, {"red": pose(apply(mass, np.array(shape[5])))})
+                bodies = [overlap.bodies for overlap in world.penetrations(0.001)]
+                assert {"red", finger} in bodies
