@@ -7,6 +7,8 @@ by these names.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
+from guided_lgp.logic.symbols import GRIPPER
+
 
 @dataclass(frozen=True)
 class Type:
@@ -150,6 +152,16 @@ class Instruction:
     effect: tuple[Attach | Atom, ...]
     contact: tuple[Term, ...] = ()
     motion: tuple[Term, ...] = ()
+
+    @property
+    def attached(self) -> Attach:
+        """The effect on the mode tree."""
+        return next(effect for effect in self.effect if isinstance(effect, Attach))
+
+    @property
+    def into_hand(self) -> bool:
+        """Whether a gripper holds the body afterwards."""
+        return GRIPPER in self.attached.parent.type.kinds
 
 
 @dataclass(frozen=True)

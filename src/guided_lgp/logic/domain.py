@@ -8,7 +8,6 @@ from guided_lgp.errors import InputError
 from guided_lgp.logic.actions import Action, Goal
 from guided_lgp.logic.declarations import (
     Atom,
-    Attach,
     FactType,
     GoalType,
     Instruction,
@@ -17,7 +16,7 @@ from guided_lgp.logic.declarations import (
     Variable,
 )
 from guided_lgp.logic.state import Fact, GroundAtom, State
-from guided_lgp.logic.symbols import GRIPPER, Symbols
+from guided_lgp.logic.symbols import Symbols
 from guided_lgp.logic.validation import check_declarations
 
 
@@ -165,14 +164,13 @@ def _fits(declared: Instruction | GoalType, symbols: tuple[str, ...]) -> bool:
 def _bind(domain: Domain, action: Action) -> GroundInstruction:
     instruction = domain.instruction(action)
     value = dict(zip(instruction.parameters, action.symbols, strict=True))
-    (attached,) = [effect for effect in instruction.effect if isinstance(effect, Attach)]
     facts = [effect for effect in instruction.effect if isinstance(effect, Atom)]
     return GroundInstruction(
         action=action,
         actor=action.symbols[0],
-        body=value[attached.body],
-        parent=value[attached.parent],
-        into_hand=GRIPPER in attached.parent.type.kinds,
+        body=value[instruction.attached.body],
+        parent=value[instruction.attached.parent],
+        into_hand=instruction.into_hand,
         precondition=tuple(_ground_atom(atom, value) for atom in instruction.precondition),
         facts=tuple(_ground_atom(atom, value) for atom in facts),
         contact=tuple(_ground_term(term, value) for term in instruction.contact),

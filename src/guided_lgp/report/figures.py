@@ -9,6 +9,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from guided_lgp.domains import load_domain
 from guided_lgp.report.drawing import PAGE, STYLE, subplots
 from guided_lgp.report.style import POLICIES, POLICY_COLORS
 from guided_lgp.search.planners import TABLE_1
@@ -150,7 +151,10 @@ def feasible_share(shares: pd.DataFrame) -> Figure:
     Args:
         shares: columns instruction, gripper, table, n, feasible.
     """
-    titles = {"grasp": "Grasp, from", "place": "Place, on"}
+    titles = {
+        one.name: f"{one.name.capitalize()}, {'from' if one.into_hand else 'on'}"
+        for one in load_domain().instructions
+    }
     figure, axes = subplots(1, len(titles), PAGE, 1.7)
     for axis, (instruction, title) in zip(axes[0], titles.items(), strict=True):
         rows = shares[shares["instruction"] == instruction]

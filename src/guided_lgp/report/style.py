@@ -1,5 +1,6 @@
 """Names and colours that tables, figures and pages share."""
 
+from guided_lgp.domains import load_domain
 from guided_lgp.policy import registry
 from guided_lgp.search.planners import UNIFORM, Planner
 
@@ -17,5 +18,7 @@ def planner_style(planner: Planner) -> dict[str, str]:
     return {"color": color, "marker": planner.marker, "linestyle": planner.linestyle}
 
 
-NETWORKS = {"instruction": "μ_ins", "grasp": "μ_grasp", "place": "μ_place"}
-"""The three networks of the paper's hierarchical policy."""
+NETWORKS = {"instruction": "μ_ins"} | {
+    instruction.name: f"μ_{instruction.name}" for instruction in load_domain().instructions
+}
+"""The networks of the paper's hierarchical policy."""
