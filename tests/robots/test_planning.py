@@ -1,5 +1,6 @@
-"""Robots that the planner was not written for: plans are found, verified and carried out."""
+"""Every robot that ships: a plan is found, verified and carried out."""
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -11,47 +12,66 @@ from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.logic import parse_objective, parse_skeleton
 from guided_lgp.params import load_params
 from guided_lgp.paths import SOURCES
-from guided_lgp.robots import load_robot
+from guided_lgp.robots import load_robot, robot_names
 from guided_lgp.scene import Box, PlacedRobot, Scene, Table
 from guided_lgp.scene.validate import validate_scene
 
-_WIDTHS = {"panda": 0.06, "ur5": 0.05}
-"""Of the boxes (m), by robot: the UR5's jaws do not move."""
+
+@dataclass(frozen=True)
+class Layout:
+    """Where a robot works: tables ahead of it, and boxes that its hand can hold."""
+
+    gripper: str
+    ahead: float
+    """Of the tables' centres (m)."""
+    height: float
+    """Of their tops (m)."""
+    width: float
+    """Of the boxes (m)."""
+
+
+LAYOUTS = {
+    "baxter": Layout("left", ahead=0.62, height=-0.10, width=0.04),
+    "panda": Layout("panda", ahead=0.50, height=0.15, width=0.06),
+    "pr2": Layout("pr2L", ahead=0.54, height=0.60, width=0.07),
+    "ur5": Layout("ur5", ahead=0.50, height=0.15, width=0.05),
+}
 
 
 def scene(robot: str, base: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Scene:
-    """Two boxes on one of two tables before a robot with one arm."""
-    x, y, yaw = base
+    """Two boxes on one of two tables before a robot."""
+    layout, (x, y, yaw) = LAYOUTS[robot], base
     turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
 
-    def at(ahead: float, aside: float, height: float) -> tuple[float, float, float]:
-        moved = turn @ (ahead, aside) + (x, y)
-        return float(moved[0]), float(moved[1]), height
+    def at(ahead: float, aside: float, up: float) -> tuple[float, float, float]:
+        moved = turn @ (layout.ahead + ahead, aside) + (x, y)
+        return float(moved[0]), float(moved[1]), layout.height + up
 
-    size = (0.12, _WIDTHS[robot], 0.08)
+    size = (0.12, layout.width, 0.08)
     tables = {"tab1": 0.27, "tab2": -0.27}
-    places = {"red": (0.45, 0.2, 0.3), "green": (0.55, 0.38, -0.8)}
+    places = {"red": (-0.05, 0.2, 0.3), "green": (0.05, 0.38, -0.8)}
     return Scene(
         robot=PlacedRobot(model=robot, base=base),
         tables=tuple(
-            Table(name=name, position=at(0.5, aside, 0.15), half_extents=(0.15, 0.2), yaw=yaw)
+            Table(name=name, position=at(0, aside, 0), half_extents=(0.15, 0.2), yaw=yaw)
             for name, aside in tables.items()
         ),
         boxes=tuple(
-            Box(name=name, size=size, position=at(px, py, 0.19), yaw=yaw + turned, on="tab1")
+            Box(name=name, size=size, position=at(px, py, 0.04), yaw=yaw + turned, on="tab1")
             for name, (px, py, turned) in places.items()
         ),
     )
 
 
-@pytest.mark.parametrize("robot", _WIDTHS)
+@pytest.mark.parametrize("robot", robot_names())
 def test_a_plan_is_verified_and_carried_out(robot: str) -> None:
-    placed = scene(robot, base=(0.2, -0.1, 0.7))
+    assert robot in LAYOUTS, f"no layout in which the robot {robot} plans"
+    placed, hand = scene(robot, base=(0.2, -0.1, 0.7)), LAYOUTS[robot].gripper
     validate_scene(placed)
     bounds = SceneBounds(placed, load_params(SOURCES / "params.yaml").bounds)
     skeleton = parse_skeleton(
-        f"(grasp {robot} green) (place {robot} green tab2) "
-        f"(grasp {robot} red) (place {robot} red green)"
+        f"(grasp {hand} green) (place {hand} green tab2) "
+        f"(grasp {hand} red) (place {hand} red green)"
     )
     result = bounds.path(skeleton)
     assert result.trajectory is not None, result.failure
