@@ -24,7 +24,7 @@ from guided_lgp.policy.registry import POLICIES, load_policy, missing_instructio
 from guided_lgp.scene import Scene, load_scene
 from guided_lgp.scene.validate import validate_scene
 from guided_lgp.search.facts import out_of_reach
-from guided_lgp.search.planners import SEARCHES, Search, check_policies
+from guided_lgp.search.planners import SEARCHES, Search, check_planners
 from guided_lgp.search.policy import Policy, Uniform
 from guided_lgp.search.problem import Problem
 from guided_lgp.search.result import REASONS, Cause, SearchResult, Times
@@ -114,7 +114,7 @@ def plan(
     Raises:
         InputError: a fault in the scene, the objective, the names or the models.
     """
-    check_policies(POLICIES)
+    check_planners(POLICIES)
     if planner not in SEARCHES:
         raise InputError("planner", f"unknown {planner!r}", ", ".join(SEARCHES))
     if not isinstance(scene, Scene):

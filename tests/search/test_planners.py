@@ -12,7 +12,7 @@ from guided_lgp.policy.registry import POLICIES
 from guided_lgp.report.style import planner_style
 from guided_lgp.scene.model import Scene
 from guided_lgp.search import planners
-from guided_lgp.search.planners import PLANNERS, SEARCHES, TABLE_1, TABLE_3, check_policies
+from guided_lgp.search.planners import PLANNERS, SEARCHES, TABLE_1, TABLE_3, check_planners
 from guided_lgp.search.problem import Problem
 
 OBJECTIVE = parse_objective(["(on red tab2)"])
@@ -43,8 +43,8 @@ def test_no_two_rows_look_the_same() -> None:
 
 
 def test_a_row_with_an_unknown_policy_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    check_policies(POLICIES)
+    check_planners(POLICIES)
     row = replace(PLANNERS["guided"], policy="oracle")
     monkeypatch.setattr(planners, "PLANNERS", {"guided": row})
     with pytest.raises(InputError, match=r"planner 'guided': policy 'oracle' is unknown .*paper"):
-        check_policies(POLICIES)
+        check_planners(POLICIES)

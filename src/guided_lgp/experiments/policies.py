@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from guided_lgp.policy.registry import POLICIES, load_policy
-from guided_lgp.search.planners import UNIFORM, Planner, check_policies
+from guided_lgp.search.planners import UNIFORM, Planner, check_planners
 from guided_lgp.search.policy import Policy, Uniform
 
 
@@ -19,6 +19,6 @@ def load_policies(planners: Iterable[Planner], directory: Path) -> dict[str, Pol
         InputError: a planner names a policy that does not exist, or its files are missing or
             damaged.
     """
-    check_policies(POLICIES)
+    check_planners(POLICIES)
     names = sorted({planner.policy for planner in planners if planner.policy})
     return {name: Uniform() if name == UNIFORM else load_policy(name, directory) for name in names}

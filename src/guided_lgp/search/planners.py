@@ -191,13 +191,17 @@ TABLE_1 = {
 """Planners of the test of generalization, in the order of Table I, by their keys there."""
 
 
-def check_policies(known: Collection[str]) -> None:
-    """Refuse a row that names a policy that nobody has declared.
+def check_planners(policies: Collection[str]) -> None:
+    """Refuse a row that names a search or a policy that nobody has declared.
 
     Raises:
-        InputError: names the row and the policies known.
+        InputError: names the row and what is known.
     """
     for planner in PLANNERS.values():
-        if planner.trained and planner.policy not in known:
+        where = f"planner {planner.name!r}"
+        if planner.search not in SEARCHES:
+            fault = f"search {planner.search!r} is unknown"
+            raise InputError(where, fault, ", ".join(SEARCHES))
+        if planner.trained and planner.policy not in policies:
             fault = f"policy {planner.policy!r} is unknown"
-            raise InputError(f"planner {planner.name!r}", fault, ", ".join(known))
+            raise InputError(where, fault, ", ".join(policies))
