@@ -23,7 +23,8 @@ from guided_lgp.policy.registry import POLICIES
 ROOT = Path(__file__).parents[1]
 PARAMS = load_params(ROOT / "params.yaml")
 INFRASTRUCTURE = {"guided_lgp"} | {
-    f"guided_lgp.{name}" for name in ("documents", "errors", "parallel", "params", "paths")
+    f"guided_lgp.{name}"
+    for name in ("documents", "errors", "parallel", "params", "paths", "tables")
 }
 """Modules that do not determine a stage's results: fan-out, messages, places."""
 UNUSED = {

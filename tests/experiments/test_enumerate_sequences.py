@@ -9,11 +9,11 @@ import pytest
 from guided_lgp.bounds.results import CoarseResult, Failure
 from guided_lgp.errors import InputError
 from guided_lgp.experiments import enumerate_sequences
-from guided_lgp.experiments.files import read_table
 from guided_lgp.logic import Skeleton
 from guided_lgp.params import BoundsParams, Params, load_params
 from guided_lgp.scene import Scene, generate
 from guided_lgp.search.observation import start
+from guided_lgp.tables import read_table
 
 OUTPUTS = [
     f"{split}{suffix}.parquet" for split in ("training", "test") for suffix in ("", "_shortest")

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 
 from guided_lgp.bounds.results import Array
 from guided_lgp.logic import (
@@ -24,6 +25,7 @@ from guided_lgp.logic import (
     two_goal_objectives,
 )
 from guided_lgp.scene import Box, Scene, Table
+from guided_lgp.tables import write_table
 
 TABLES = {"tab1": (0.54, 0.33, 0.60), "tab2": (0.54, -0.33, 0.60)}
 GRIPPERS = {"pr2L": (0.3, 0.7, 0.8), "pr2R": (0.3, -0.7, 0.8)}
@@ -61,6 +63,10 @@ def positions_along(scene: Scene, skeleton: Skeleton) -> list[dict[str, Array]]:
         grippers, tables = ({name: fixed[name] for name in part} for part in (GRIPPERS, TABLES))
         frames.append(grippers | dict(boxes) | tables)
     return frames
+
+
+def write_frame(path: Path, frame: pd.DataFrame) -> None:
+    write_table(path, pa.Table.from_pandas(frame, preserve_index=False))
 
 
 @dataclass(frozen=True)
@@ -103,12 +109,12 @@ def enumerate_world(folder: Path, configurations: int, seed: int) -> Enumeration
             level = [path for path, verdict in zip(level, verdicts, strict=True) if verdict]
     names = ["configuration", "skeleton", "length", "feasible", "states"]
     world = Enumeration(scenes, folder / "training.parquet", folder / "shortest.parquet", feasible)
-    pd.DataFrame(rows, columns=names).to_parquet(world.sequences)
+    write_frame(world.sequences, pd.DataFrame(rows, columns=names))
     lengths = [
         (scene.name, format_objective(goals), world.shortest_length(scene, goals))
         for scene in scenes
         for goals in two_goal_objectives(scene.symbols)
     ]
     table = pd.DataFrame(lengths, columns=["configuration", "objective", "length"])
-    table.astype({"length": "Int64"}).to_parquet(world.shortest)
+    write_frame(world.shortest, table.astype({"length": "Int64"}))
     return world

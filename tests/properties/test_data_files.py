@@ -28,8 +28,6 @@ from safetensors.numpy import load_file, save_file
 
 from guided_lgp.bounds.plan_file import read_plan
 from guided_lgp.domains import load_domain
-from guided_lgp.experiments.enumerate_sequences import SHORTEST, VERDICTS
-from guided_lgp.experiments.files import read_table, write_table
 from guided_lgp.logic import two_goal_objectives
 from guided_lgp.policy.paper.dataset import Dataset, load_dataset
 from guided_lgp.policy.paper.encoding import Encoding
@@ -40,6 +38,8 @@ from guided_lgp.policy.tensors import write_tensors
 from guided_lgp.report.inputs import read_object
 from guided_lgp.scene import GeneratedScenes, generate, load_scene, load_scenes
 from guided_lgp.scene.setups import SETUPS
+from guided_lgp.sequences import SHORTEST, VERDICTS
+from guided_lgp.tables import read_table, write_table
 
 SYMBOLS = load_domain().symbols(
     gripper=("pr2L", "pr2R"), box=("red", "green", "blue"), table=("tab1", "tab2")

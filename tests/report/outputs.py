@@ -8,7 +8,6 @@ import pyarrow as pa
 
 from guided_lgp.bounds.results import Attachment, PathResult, Trajectory
 from guided_lgp.documents import write_json
-from guided_lgp.experiments.files import write_table
 from guided_lgp.experiments.problems import PROBLEMS
 from guided_lgp.logic import (
     Skeleton,
@@ -23,6 +22,7 @@ from guided_lgp.paths import EVALUATION, METRICS, SCENES, SEQUENCES, TRAINING
 from guided_lgp.policy.paper.encoding import Encoding
 from guided_lgp.robots import load_robot
 from guided_lgp.scene import Scene, generate
+from guided_lgp.tables import write_table
 
 TREE: dict[str, tuple[float | None, ...]] = {
     "breadth_first": (400.0, 3000.0, 44000.0, 216000.0, *[None] * 6),

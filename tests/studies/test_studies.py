@@ -12,7 +12,6 @@ import yaml
 
 from guided_lgp.errors import InputError
 from guided_lgp.experiments.enumerate_sequences import shortest_table, verdict_table
-from guided_lgp.experiments.files import write_table
 from guided_lgp.logic import one_goal_objectives, satisfied, two_goal_objectives
 from guided_lgp.params import SampleRecipe, load_params
 from guided_lgp.scene import generate
@@ -20,6 +19,7 @@ from guided_lgp.search.enumerate import enumerate_sequences
 from guided_lgp.studies import evaluate, feasibility, train
 from guided_lgp.studies.cases import OUTCOMES, load_study
 from guided_lgp.studies.tables import render
+from guided_lgp.tables import write_table
 from stand_ins import NothingOnBlue
 
 ROOT = Path(__file__).parents[2]

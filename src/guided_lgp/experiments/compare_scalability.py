@@ -19,7 +19,6 @@ import pyarrow as pa
 from guided_lgp import parallel
 from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.documents import write_json
-from guided_lgp.experiments.files import write_table
 from guided_lgp.experiments.memory import peak_mb, reset_peak
 from guided_lgp.experiments.policies import load_policies
 from guided_lgp.experiments.problems import PROBLEMS
@@ -30,6 +29,7 @@ from guided_lgp.scene import Scene, load_scenes
 from guided_lgp.search.planners import TABLE_3, controls_last
 from guided_lgp.search.problem import Problem
 from guided_lgp.search.result import SearchResult
+from guided_lgp.tables import write_table
 
 Row = dict[str, Any]
 

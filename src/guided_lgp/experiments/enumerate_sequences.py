@@ -23,7 +23,6 @@ import guided_lgp
 from guided_lgp import parallel
 from guided_lgp.bounds.results import CoarseResult
 from guided_lgp.bounds.scene_bounds import SceneBounds
-from guided_lgp.experiments.files import write_table
 from guided_lgp.logic import (
     format_objective,
     format_skeleton,
@@ -35,33 +34,10 @@ from guided_lgp.paths import SCENES, SEQUENCES
 from guided_lgp.scene import Scene, load_scenes
 from guided_lgp.search.enumerate import Enumeration, enumerate_sequences
 from guided_lgp.search.observation import observe, start
+from guided_lgp.sequences import SHORTEST, VERDICTS
+from guided_lgp.tables import write_table
 
 SPLITS = ("training", "test")
-
-VERDICTS = pa.schema(
-    [
-        ("configuration", pa.string()),
-        ("skeleton", pa.string()),
-        ("length", pa.int32()),
-        ("feasible", pa.bool_()),
-        ("failure_action", pa.int32()),
-        ("failure_constraint", pa.string()),
-        ("failure_violation", pa.float64()),
-        ("states", pa.list_(pa.float64())),
-    ]
-)
-"""``states``: for feasible sequences, positions (length + 1, symbols, 3) in m, flattened; symbols
-in the order grippers, boxes, surfaces; state k: after k actions, the arms retreated."""
-
-SHORTEST = pa.schema(
-    [
-        ("configuration", pa.string()),
-        ("objective", pa.string()),
-        ("symbolic_length", pa.int32()),
-        ("length", pa.int32()),
-    ]
-)
-"""``length``: 0 if the objective holds at the start, null if no sequence was found feasible."""
 
 logger = logging.getLogger(__name__)
 

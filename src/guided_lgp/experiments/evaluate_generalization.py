@@ -17,7 +17,6 @@ import pyarrow as pa
 from guided_lgp import parallel
 from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.documents import write_json
-from guided_lgp.experiments.files import read_table, write_table
 from guided_lgp.experiments.policies import load_policies
 from guided_lgp.logic import (
     Objective,
@@ -39,6 +38,8 @@ from guided_lgp.search.planners import TABLE_1
 from guided_lgp.search.policy import Policy
 from guided_lgp.search.problem import Problem
 from guided_lgp.search.result import SearchResult
+from guided_lgp.sequences import read_shortest, read_verdicts
+from guided_lgp.tables import write_table
 
 Row = dict[str, Any]
 
@@ -106,21 +107,17 @@ def _tasks(params: Params, root: Path) -> list[Task]:
     scenes = load_scenes(root / SCENES / "test.json").scenes
     draw = params.build_dataset
     seen = training_objectives(scenes[0].symbols, draw.training_objectives, draw.seed)
-    stage = "enumerate_sequences"
-    lengths: dict[str, dict[str, int | None]] = {scene.name: {} for scene in scenes}
-    path = root / SEQUENCES / "test_shortest.parquet"
-    for row in read_table(path, stage, ["configuration", "objective", "length"]):
-        lengths[row["configuration"]][row["objective"]] = row["length"]
+    lengths = read_shortest(root / SEQUENCES / "test_shortest.parquet")
     sequences: dict[str, list[str]] = {scene.name: [] for scene in scenes}
     path = root / SEQUENCES / "test.parquet"
-    for row in read_table(path, stage, ["configuration", "skeleton", "feasible"]):
+    for row in read_verdicts(path, "configuration", "skeleton", "feasible").to_pylist():
         if row["feasible"]:
             sequences[row["configuration"]].append(row["skeleton"])
     return [
         Task(
             scene,
             tuple(seen),
-            lengths[scene.name],
+            lengths.get(scene.name, {}),
             tuple(sequences[scene.name]),
             params.bounds,
             params.evaluate_generalization,

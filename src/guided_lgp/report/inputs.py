@@ -9,12 +9,12 @@ import pandas as pd
 
 from guided_lgp.documents import read_json
 from guided_lgp.errors import InputError
-from guided_lgp.experiments.files import read_table
 from guided_lgp.experiments.problems import PROBLEMS, ProblemClass
 from guided_lgp.paths import EVALUATION, METRICS, REPORTS, SCENES, SEQUENCES, TRAINING
 from guided_lgp.report.style import NETWORKS
 from guided_lgp.scene import GeneratedScenes, load_scenes
 from guided_lgp.search.planners import TABLE_1
+from guided_lgp.tables import read_table
 
 Metrics = Mapping[str, Any]
 

@@ -15,7 +15,6 @@ from guided_lgp.bounds.results import CoarseResult, PathResult
 from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.documents import write_json
 from guided_lgp.errors import InputError
-from guided_lgp.experiments.files import read_table
 from guided_lgp.logic import (
     Objective,
     Skeleton,
@@ -32,6 +31,7 @@ from guided_lgp.scene import Scene, load_scenes
 from guided_lgp.search.planners import TABLE_1
 from guided_lgp.search.problem import Problem
 from guided_lgp.search.result import SearchResult
+from guided_lgp.sequences import read_shortest
 from guided_lgp.studies.cases import OUTCOMES, RESULTS, TRAINED, StudyParams, load_study
 
 Row = dict[str, Any]
@@ -97,16 +97,14 @@ def evaluate(root: Path, table: str) -> None:
     write_json(root / RESULTS / f"{table}.json", figures)
 
 
-def shortest_lengths(root: Path, scenes: Sequence[Scene]) -> dict[str, dict[str, int | None]]:
+def shortest_lengths(root: Path, scenes: Sequence[Scene]) -> Mapping[str, Mapping[str, int | None]]:
     """Shortest feasible length by test configuration and objective.
 
     Raises:
         InputError: the output of enumerate_sequences is missing or of other scenes.
     """
     path = root / SEQUENCES / "test_shortest.parquet"
-    lengths: dict[str, dict[str, int | None]] = {}
-    for row in read_table(path, "enumerate_sequences", ["configuration", "objective", "length"]):
-        lengths.setdefault(row["configuration"], {})[row["objective"]] = row["length"]
+    lengths = read_shortest(path)
     for scene in scenes:
         if scene.name not in lengths:
             raise InputError(str(path), f"lacks {scene.name}", "the sequences of the same scenes")

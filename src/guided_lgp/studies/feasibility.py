@@ -13,11 +13,10 @@ from pathlib import Path
 
 import numpy as np
 
-from guided_lgp import parallel
+from guided_lgp import parallel, sequences
 from guided_lgp.bounds.results import Array, CoarseResult
 from guided_lgp.documents import write_json
 from guided_lgp.errors import InputError
-from guided_lgp.experiments.files import read_table
 from guided_lgp.logic import Skeleton, format_objective, parse_skeleton, progress
 from guided_lgp.params import BoundsParams, SearchLimits
 from guided_lgp.paths import SCENES, SEQUENCES, TRAINED
@@ -120,9 +119,9 @@ def read_verdicts(scenes: Sequence[Scene], path: Path) -> Verdicts:
     Raises:
         InputError: the file is missing, damaged, or not of these scenes.
     """
-    columns = ["configuration", "skeleton", "feasible", "states"]
+    columns = "configuration", "skeleton", "feasible", "states"
     rows_of: dict[str, list[Row]] = {}
-    for row in read_table(path, "enumerate_sequences", columns):
+    for row in sequences.read_verdicts(path, *columns).to_pylist():
         rows_of.setdefault(row["configuration"], []).append(row)
     inputs: list[list[float]] = []
     feasible: list[bool] = []

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from synthetic import Enumeration, make_scene, positions_along
+from synthetic import Enumeration, make_scene, positions_along, write_frame
 
 from guided_lgp.domains import load_domain
 from guided_lgp.errors import InputError
@@ -360,14 +360,14 @@ def test_tables_of_other_content_are_refused(
         row = next(index for index, feasible in enumerate(frame["feasible"]) if feasible)
         values = [*frame[column]]
         values[row] = value
-        frame.assign(**{column: values}).to_parquet(odd)
+        write_frame(odd, frame.assign(**{column: values}))
         with pytest.raises(InputError, match=r"odd\.parquet: .*enumerate_sequences"):
             build_dataset(world.scenes, odd, world.shortest, objectives, 0)
     odd.write_bytes(b"PAR1" + b"\xff" * 60 + b"PAR1")
     with pytest.raises(InputError, match=r"odd\.parquet: cannot be read"):
         build_dataset(world.scenes, odd, world.shortest, objectives, 0)
     lengths = pd.read_parquet(world.shortest)
-    pd.concat([lengths, lengths]).to_parquet(odd)
+    write_frame(odd, pd.concat([lengths, lengths]))
     with pytest.raises(InputError, match=r"odd\.parquet: has an objective .* twice"):
         build_dataset(world.scenes, world.sequences, odd, objectives, 0)
 
@@ -386,12 +386,12 @@ def test_sequences_that_do_not_fit_the_scenes_are_refused(
     short = tmp_path / "short.parquet"
     frame = pd.read_parquet(world.sequences)
     frame["states"] = [None if row is None else row[:-1] for row in frame["states"]]
-    frame.to_parquet(short)
+    write_frame(short, frame)
     with pytest.raises(InputError, match=r"short\.parquet: states of train-000.*numbers"):
         build_dataset(world.scenes, short, world.shortest, objectives, 0)
 
     none = tmp_path / "none.parquet"
-    pd.read_parquet(world.sequences).assign(feasible=False).to_parquet(none)
+    write_frame(none, pd.read_parquet(world.sequences).assign(feasible=False))
     with pytest.raises(InputError, match="no training objective has a feasible sequence"):
         build_dataset(world.scenes, none, world.shortest, objectives, 0)
 

@@ -7,8 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-import pyarrow as pa
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from guided_lgp.errors import InputError
@@ -32,25 +30,11 @@ from guided_lgp.policy.paper.documents import in_files
 from guided_lgp.policy.paper.encoding import Encoding
 from guided_lgp.policy.paper.filling import Slots
 from guided_lgp.scene import Scene
+from guided_lgp.sequences import read_shortest, read_verdicts
 
 _LEAST_DEVIATION = 1e-3  # m; less is no information, and scaling it up would be noise
 _NONE = -1
 PAPER = SampleRecipe()
-_VERDICTS = pa.schema(
-    [
-        pa.field("configuration", pa.string(), nullable=False),
-        pa.field("skeleton", pa.string(), nullable=False),
-        pa.field("feasible", pa.bool_(), nullable=False),
-        pa.field("states", pa.list_(pa.float64())),
-    ]
-)
-_LENGTHS = pa.schema(
-    [
-        pa.field("configuration", pa.string(), nullable=False),
-        pa.field("objective", pa.string(), nullable=False),
-        pa.field("length", pa.int32()),
-    ]
-)
 _ENUMERATION = "the output of the stage enumerate_sequences for the same scenes"
 
 
@@ -89,7 +73,8 @@ def build_dataset(
     )
     symbols = _common_symbols(scenes, encoding)
     lengths = _shortest_lengths(shortest, scenes, objectives)
-    verdicts = _read(sequences, _VERDICTS)
+    columns = "configuration", "skeleton", "feasible", "states"
+    verdicts = read_verdicts(sequences, *columns).to_pandas()
     feasible = verdicts[verdicts["feasible"]]
     rows_of = {str(name): rows for name, rows in feasible.groupby("configuration")}
     goals = _GoalCodes(objectives, symbols, encoding, recipe)
@@ -333,27 +318,12 @@ def _shortest_lengths(
     path: Path, scenes: Sequence[Scene], objectives: Sequence[Objective]
 ) -> FloatArray:
     """(scenes, objectives) shortest feasible lengths; NaN where there is none."""
-    table = _read(path, _LENGTHS)
-    lengths = table.set_index(["configuration", "objective"])["length"]
-    if not lengths.index.is_unique:
-        raise InputError(str(path), "has an objective of a configuration twice", _ENUMERATION)
-    names = [scene.name for scene in scenes]
-    texts = [format_objective(objective) for objective in objectives]
-    wanted = pd.MultiIndex.from_product([names, texts])
-    for name, text in wanted[~wanted.isin(lengths.index)]:
-        raise InputError(str(path), f"lacks {name} {text}", _ENUMERATION)
-    values: FloatArray = lengths.loc[wanted].to_numpy(dtype=np.float32, na_value=np.nan)
-    return values.reshape(len(names), len(texts))
-
-
-def _read(path: Path, columns: pa.Schema) -> pd.DataFrame:
-    try:
-        table = pq.read_table(path, columns=columns.names, page_checksum_verification=True).cast(
-            columns
-        )
-        table.validate(full=True)  # strings that are no UTF-8, for instance
-        frame: pd.DataFrame = table.to_pandas()
-    except (OSError, ValueError, KeyError, pa.ArrowException) as error:
-        fault = " ".join(str(error).split())
-        raise InputError(str(path), f"cannot be read: {fault}", _ENUMERATION) from None
-    return frame
+    lengths = read_shortest(path)
+    values = np.full((len(scenes), len(objectives)), np.nan, dtype=np.float32)
+    for row, scene in enumerate(scenes):
+        own = lengths.get(scene.name, {})
+        for column, text in enumerate(map(format_objective, objectives)):
+            if text not in own:
+                raise InputError(str(path), f"lacks {scene.name} {text}", _ENUMERATION)
+            values[row, column] = np.nan if own[text] is None else own[text]
+    return values

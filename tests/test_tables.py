@@ -8,7 +8,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from guided_lgp.errors import InputError
-from guided_lgp.experiments.files import read_table, write_table
+from guided_lgp.tables import read_table, write_table
 
 TABLE = pa.table({"name": ["a", "b"], "value": [1, 2]})
 
@@ -27,14 +27,14 @@ def test_faults_name_the_stage(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"is missing .*stage some_stage"):
         read_table(path, "some_stage", ["name"])
     path.write_bytes(b"PAR1 truncated")
-    with pytest.raises(InputError, match=r"cannot be read .*stage some_stage"):
+    with pytest.raises(InputError, match=r"cannot be read: .*stage some_stage"):
         read_table(path, "some_stage", ["name"])
     pq.write_table(TABLE, path)
     with pytest.raises(InputError, match=r"another version .*stage some_stage"):
         read_table(path, "some_stage", ["name"])
     write_table(path, TABLE)
     path.write_bytes(path.read_bytes()[:-20])
-    with pytest.raises(InputError, match=r"cannot be read .*stage some_stage"):
+    with pytest.raises(InputError, match=r"cannot be read: .*stage some_stage"):
         read_table(path, "some_stage", ["name"])
     write_table(path, TABLE)
     with pytest.raises(InputError, match=r"stage some_stage"):

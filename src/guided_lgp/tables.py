@@ -1,6 +1,7 @@
 """Tables on disk: written whole or not at all, refused if of another version."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -36,18 +37,46 @@ def read_table(path: Path, stage: str, columns: Sequence[str]) -> list[dict[str,
     Raises:
         InputError: the file is missing, damaged or of another version.
     """
+    with _readable(path, stage) as parquet:
+        rows: list[dict[str, Any]] = parquet(columns).to_pylist()
+    return rows
+
+
+def read_columns(path: Path, stage: str, columns: pa.Schema) -> pa.Table:
+    """Read columns of a Parquet file, of these types and, unless they may be, without null.
+
+    Raises:
+        InputError: the file is missing, damaged or of another version, or has other types.
+    """
+    with _readable(path, stage) as parquet:
+        table = parquet(columns.names).cast(columns)
+        table.validate(full=True)  # strings that are no UTF-8, for instance
+    return table
+
+
+@contextmanager
+def _readable(path: Path, stage: str) -> Iterator[Callable[[Sequence[str]], pa.Table]]:
+    """A function that reads columns; what goes wrong is one line.
+
+    Raises:
+        InputError: see above.
+    """
     remedy = f"the output of stage {stage}"
-    try:
+
+    def read(columns: Sequence[str]) -> pa.Table:
         version = (pq.read_schema(path).metadata or {}).get(_KEY)
         if version != _VERSION:
             raise InputError(str(path), "is of another version", remedy)
         table = pq.read_table(path, columns=list(columns), page_checksum_verification=True)
         if missing := set(columns) - set(table.column_names):
             raise InputError(str(path), f"has no column {min(missing)!r}", remedy)
-        rows: list[dict[str, Any]] = table.to_pylist()
+        return table
+
+    try:
+        yield read
     except InputError:
         raise
     except (OSError, ValueError, KeyError, pa.ArrowException) as error:
-        fault = "is missing" if isinstance(error, FileNotFoundError) else "cannot be read"
+        missing = isinstance(error, FileNotFoundError)
+        fault = "is missing" if missing else f"cannot be read: {' '.join(str(error).split())}"
         raise InputError(str(path), fault, remedy) from None
-    return rows
