@@ -178,7 +178,7 @@ def _write_scalability(root: Path, scenes: Any) -> None:
                     "objective": format_objective(objective),
                     "planner": planner,
                     "solved": size is not None,
-                    "reason": "stopped" if size is None else None,
+                    "reason": "max_tree_size" if size is None else None,
                     "skeleton": "(grasp pr2L red) (place pr2L red tab1)" if size else None,
                 }
                 for scene in kept

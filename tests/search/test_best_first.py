@@ -117,7 +117,7 @@ def test_ends_after_so_many_sequences_without_a_path(scene: Scene, limits: Searc
     result = best_first.plan(
         Problem(scene, parse_objective(["(held red)"]), limits, bounds, UNIFORM)
     )
-    assert (result.reason, result.path_calls) == ("paths", 5)
+    assert (result.reason, result.path_calls) == ("max_paths", 5)
     assert "limit of sequences without a path" in result.explanation
 
 
@@ -125,5 +125,5 @@ def test_ends_after_so_many_coarse_bounds(scene: Scene, limits: SearchLimits) ->
     bounds = ScriptedBounds(scene, coarse=lambda skeleton: len(skeleton) < 4)
     limits = limits.model_copy(update={"max_sequences": 70})
     result = best_first.plan(Problem(scene, TOWER, limits, bounds, UNIFORM))
-    assert (result.reason, result.coarse_calls) == ("coarse", 70)
+    assert (result.reason, result.coarse_calls) == ("max_sequences", 70)
     assert "limit of sequences for the coarse bound" in result.explanation

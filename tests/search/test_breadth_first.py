@@ -53,7 +53,7 @@ def test_stops_at_the_limit_and_says_why(scene: Scene) -> None:
     )
     result = breadth_first.plan(Problem(scene, TOWER, limits, bounds))
     assert not result.solved
-    assert result.reason == "stopped"
+    assert result.reason == "max_tree_size"
     assert 2_000 <= result.tree_size < 2_020
     assert "stopped at the limit" in result.explanation
     assert "reach violated" in result.explanation

@@ -19,9 +19,9 @@ app = typer.Typer()
 
 _HINTS: Mapping[str | None, str] = {
     "attempts": "--planner complete goes on after the last attempt",
-    "stopped": "--max-nodes raises the limit",
-    "coarse": "max_sequences in the file of --params raises the limit",
-    "paths": "max_paths in the file of --params raises the limit",
+    "max_tree_size": "--max-nodes raises the limit",
+    "max_sequences": "max_sequences in the file of --params raises the limit",
+    "max_paths": "max_paths in the file of --params raises the limit",
     "max_seconds": "--timeout raises the limit",
 }
 """What a user can do about the limit at which a search ended."""

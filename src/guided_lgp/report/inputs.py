@@ -156,7 +156,7 @@ def _setups(scalability: Metrics) -> list[str]:
 
 def mask_stopped(metrics: Metrics, runs: pd.DataFrame) -> Metrics:
     """Metrics by problem and planner without the means of planners stopped at the node limit."""
-    limited = runs[runs["reason"] == "stopped"]
+    limited = runs[runs["reason"] == "max_tree_size"]
     stopped = set(zip(limited["problem"], limited["planner"], strict=True))
     return {
         problem: {

@@ -12,14 +12,17 @@ from guided_lgp.search.problem import Problem
 Cause = Literal["infeasible", "max_depth", "max_seconds"]
 """Why an attempt of the guided search ended; the first two as in the paper (Table I)."""
 
-Reason = Literal["stopped", "coarse", "paths", "max_seconds", "exhausted", "attempts", "impossible"]
-"""Why a search ended without a plan: limit of nodes, of either bound or of time, nothing left to
-expand, no reattempt left, or a goal that was known to be out of reach before any search."""
+Limit = Literal["max_tree_size", "max_sequences", "max_paths", "max_seconds"]
+"""The limits that end a search, by their names in the parameters."""
+
+Reason = Limit | Literal["exhausted", "attempts", "impossible"]
+"""Why a search ended without a plan: a limit, nothing left to expand, no reattempt left, or a goal
+that was known to be out of reach before any search."""
 
 REASONS: Mapping[Reason, str] = {
-    "stopped": "stopped at the limit of the tree size",
-    "coarse": "stopped at the limit of sequences for the coarse bound",
-    "paths": "stopped at the limit of sequences without a path",
+    "max_tree_size": "stopped at the limit of the tree size",
+    "max_sequences": "stopped at the limit of sequences for the coarse bound",
+    "max_paths": "stopped at the limit of sequences without a path",
     "max_seconds": "stopped at the limit of time",
     "exhausted": "every sequence within the depth limit is infeasible",
     "attempts": "the last allowed attempt failed",
@@ -172,16 +175,16 @@ class Run:
         allowed = self._limits.max_seconds
         return allowed is not None and time.perf_counter() - self._start >= allowed
 
-    def limit_reached(self, tree_size: int) -> Reason | None:
+    def limit_reached(self, tree_size: int) -> Limit | None:
         """The limit that ends the search, if one is reached."""
         limits = self._limits
         if self._path_calls >= limits.max_paths:
-            return "paths"
+            return "max_paths"
         if len(self._asked) >= limits.max_sequences:
-            return "coarse"
+            return "max_sequences"
         if self.expired:
             return "max_seconds"
-        return "stopped" if tree_size >= limits.max_tree_size else None
+        return "max_tree_size" if tree_size >= limits.max_tree_size else None
 
     def attempt_failed(self, cause: Cause) -> None:
         """Note the end of an attempt."""

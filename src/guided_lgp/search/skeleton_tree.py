@@ -15,7 +15,7 @@ from guided_lgp.logic import (
 )
 from guided_lgp.search.observation import observe, start
 from guided_lgp.search.problem import Problem
-from guided_lgp.search.result import Reason, Run, SearchResult
+from guided_lgp.search.result import Limit, Reason, Run, SearchResult
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ class SkeletonTree:
         ).tolist()
         return scores
 
-    def limit_reached(self) -> Reason | None:
+    def limit_reached(self) -> Limit | None:
         """The limit that ends the search, if one is reached."""
         return self.run.limit_reached(self.size)
 
