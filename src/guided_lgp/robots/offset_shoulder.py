@@ -121,6 +121,10 @@ class OffsetShoulder:
         path[:, _CONTINUOUS] = np.unwrap(path[:, _CONTINUOUS], axis=0)
         return None if np.abs(np.diff(path, axis=0)).max(initial=0.0) > _JUMP else path
 
+    def redundancies(self, count: int) -> Array:
+        """Values (count,) of the pan joint (rad) at which solutions are looked for."""
+        return np.asarray(np.linspace(*self._lengths.pans, count) * self._signs[0])
+
     def forward(self, q: Array) -> tuple[Array, Array]:
         """Rotation (..., 3, 3) and origin (..., 3) of the tool frame in the robot's root.
 

@@ -14,8 +14,6 @@ from guided_lgp.robots.robot import Robot
 
 _VALUES = 15
 """Values of the redundant joint at which solutions are looked for."""
-_INSET = 0.02
-"""Distance (rad) of these from the joint's limits."""
 _TURN = 2 * np.pi
 
 
@@ -34,6 +32,10 @@ class Solver(Protocol):
 
     def forward(self, q: Array) -> tuple[Array, Array]:
         """Rotation (..., 3, 3) and origin (..., 3) of the tool frame."""
+        ...
+
+    def redundancies(self, count: int) -> Array:
+        """Values (count,) of the redundant joint (rad) that are worth a try."""
         ...
 
 
@@ -67,14 +69,7 @@ class PlacedArm:
     @cached_property
     def redundancies(self) -> Array:
         """(m,) values (rad) of the redundant joint that are worth a try; zero if there is none."""
-        arm = self.arm
-        if arm.redundant is None:
-            return np.zeros(1)
-        if arm.closed_form is not None:
-            values = np.linspace(*arm.closed_form.pans, _VALUES)
-            return np.asarray(values * arm.signs[arm.redundant])
-        low, high = np.clip(arm.limits[arm.redundant], -np.pi, np.pi)
-        return np.linspace(low + _INSET, high - _INSET, _VALUES)
+        return self._solver.redundancies(_VALUES)
 
     @cached_property
     def turning(self) -> NDArray[np.int64]:
