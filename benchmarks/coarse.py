@@ -28,7 +28,6 @@ from guided_lgp.bounds.results import Array, CoarseResult
 from guided_lgp.logic import Skeleton, applicable_actions, successor
 from guided_lgp.params import load_params
 from guided_lgp.paths import PARAMS
-from guided_lgp.robots import load_robot
 from guided_lgp.scene import Scene
 from guided_lgp.scene.generate import generate
 
@@ -120,12 +119,13 @@ def _judge(skeleton: Skeleton, scene: Scene, usual: CoarseBound, patient: Coarse
 def _one_start(sequence: Sequence) -> float:
     """Seconds from skeleton and prefix to the end of the first start, without verification."""
     geometry = SceneGeometry(sequence.scene)
-    starts = Starts(geometry, default_solver(load_robot("pr2")))
+    solver = default_solver(sequence.scene.robot.description)
+    starts = Starts(geometry, solver)
     began = time.process_time()
     formulation = Formulator(geometry, Margins()).build(sequence.result.skeleton)
     warm_start = getattr(sequence.prefix, "values", None)
     start = starts.draw(formulation, np.random.default_rng(0), 0.0, warm_start)
-    default_solver(load_robot("pr2")).solve(formulation.program, start, Settings())
+    solver.solve(formulation.program, start, Settings())
     return time.process_time() - began
 
 
@@ -136,22 +136,20 @@ def _against_ipopt(sequences: list[Sequence]) -> dict[str, Any]:
     with the same tolerance and slack: without the cost, to a feasible point, which compares like
     with like; and with it, to a local optimum. The time to build IPOPT's programs is left out.
     """
+    solver = default_solver(sequences[0].scene.robot.description)
     programs: list[tuple[Program, Array]] = []
     for sequence in sequences:
         geometry = SceneGeometry(sequence.scene)
         formulation = Formulator(geometry, Margins()).build(sequence.result.skeleton)
-        start = Starts(geometry, default_solver(load_robot("pr2"))).draw(
-            formulation, np.random.default_rng(0), noise=0.0
-        )
+        start = Starts(geometry, solver).draw(formulation, np.random.default_rng(0), noise=0.0)
         programs.append((formulation.program, start))
     # before IPOPT, whose building leaves a memory in which the first solve is slow
     ours = [
-        _timed(partial(default_solver(load_robot("pr2")).solve, program, start, Settings()))
-        for program, start in programs
+        _timed(partial(solver.solve, program, start, Settings())) for program, start in programs
     ]
     feasible, optimal = [], []
     for program, start in programs:
-        oracle = Ipopt(load_robot("pr2"), program, start, Settings())
+        oracle = Ipopt(sequences[0].scene.robot.description, program, start, Settings())
         feasible.append(_timed(partial(oracle.solve, start, optimal=False)))
         optimal.append(_timed(partial(oracle.solve, start)))
     figures: dict[str, Any] = {
