@@ -1,6 +1,6 @@
 """``apart(gripper, gripper)``: the spheres of two arms keep their distance."""
 
-from itertools import product
+from itertools import permutations, product
 
 import casadi as ca
 
@@ -26,11 +26,8 @@ def _kernel(one: Chain, other: Chain, fixed: int) -> Kernel:
 
 
 def _kernels(robot: RobotKinematics) -> tuple[Kernel, ...]:
-    if len(robot.arms) < 2:
-        return ()
-    return tuple(
-        _kernel(one, other, len(robot.fixed)) for one, other in product(robot.chains, robot.chains)
-    )
+    chains = [(one.chain, other.chain) for one, other in permutations(robot.arms.values(), 2)]
+    return tuple(_kernel(*pair, len(robot.fixed)) for pair in dict.fromkeys(chains))
 
 
 def keep_apart(
