@@ -13,8 +13,8 @@ import numpy as np
 
 from guided_lgp.bounds.checks import Violation, box_sizes
 from guided_lgp.bounds.results import Array, Trajectory
+from guided_lgp.bounds.verify.attachments import switches_of
 from guided_lgp.bounds.verify.geometry import grasp_faults
-from guided_lgp.bounds.verify.path import switches_of
 from guided_lgp.logic import GroundAtom, Objective, Skeleton, State, successor
 from guided_lgp.poses import compose, inverse
 from guided_lgp.scene import Scene

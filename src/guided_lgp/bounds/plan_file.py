@@ -15,7 +15,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from guided_lgp.bounds.results import Attachment, Keyframe, PathResult, Trajectory
-from guided_lgp.bounds.verify.path import switches_of
+from guided_lgp.bounds.verify.attachments import switches_of
 from guided_lgp.documents import read_json, write_text
 from guided_lgp.errors import InputError
 from guided_lgp.logic import Action, Goal, Objective, Skeleton

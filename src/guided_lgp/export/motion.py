@@ -16,7 +16,7 @@ from scipy.interpolate import BPoly, CubicSpline
 
 from guided_lgp.bounds.plan_file import Plan
 from guided_lgp.bounds.results import Array, Trajectory
-from guided_lgp.bounds.verify.path import switches_of
+from guided_lgp.bounds.verify.attachments import switches_of
 from guided_lgp.errors import InputError
 from guided_lgp.robots.robot import Robot
 

@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from guided_lgp.bounds.results import Trajectory
-from guided_lgp.bounds.verify.path import switches_of
+from guided_lgp.bounds.verify.attachments import switches_of
 from guided_lgp.logic import Skeleton
 from guided_lgp.poses import Array, compose, inverse
 from guided_lgp.scene.model import Scene

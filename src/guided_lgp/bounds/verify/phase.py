@@ -31,7 +31,8 @@ class Phase:
         self, scene: Scene, state: State, boxes: Mapping[str, Array], q: Array, times: Array
     ) -> None:
         robot = scene.robot.description
-        self._robot, self._state = robot, state
+        self.scene, self.state = scene, state
+        self._robot = robot
         self._arms = len(robot.joint_names)
         self._start = dict(boxes)
         tools = scene.robot.tool_poses(q[:1, : self._arms])
@@ -71,9 +72,9 @@ class Phase:
         Beside those that hold it: near its ends, those that let go of it as the phase begins, or
         take hold of it as it ends.
         """
-        touches = [set(self._state.held) for _ in self.q]
+        touches = [set(self.state.held) for _ in self.q]
         for other, end in ((before, 0), (after, -1)):
-            for box, gripper in set(other.held) ^ set(self._state.held):
+            for box, gripper in set(other.held) ^ set(self.state.held):
                 path = self._tools[gripper][:, :3]
                 near = np.linalg.norm(path - path[end], axis=1) <= APPROACH
                 for sample in np.flatnonzero(near):
@@ -82,8 +83,8 @@ class Phase:
 
     def tilt_fault(self) -> Violation | None:
         """A box that carries others, or is carried, must stay level."""
-        for held, _ in self._state.held:
-            if self._state.standing_on(held):
+        for held, _ in self.state.held:
+            if self.state.standing_on(held):
                 tilted = tilt(self._moving[held])
                 if tilted.max() > CARRY_ANGLE:
                     time = float(self.times[np.argmax(tilted > CARRY_ANGLE)])
