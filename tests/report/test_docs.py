@@ -55,7 +55,7 @@ def test_links_and_named_sources_exist(page: Path, rendered: Path) -> None:
 
 
 def test_the_example_domain_is_one_file(tmp_path: Path) -> None:
-    declaration, script = blocks(ROOT / "docs/extending.md", "python")
+    declaration, script, *_ = blocks(ROOT / "docs/extending.md", "python")
     file = tmp_path / declaration.splitlines()[0].removeprefix("# ")
     shutil.copytree(ROOT / "src/guided_lgp", tmp_path / "src/guided_lgp")
     file.write_text(declaration, encoding="utf-8")
@@ -68,3 +68,20 @@ def test_the_example_domain_is_one_file(tmp_path: Path) -> None:
     assert re.fullmatch(r"\(unstack \S+ red tab1\) \(place \S+ red green\)\n", done.stdout)
     unchanged = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert "unknown 'blocks' (accepted: handover, pick_and_place)" in unchanged.stderr
+
+
+def test_the_example_policy_is_one_package(tmp_path: Path) -> None:
+    *_, declaration, script = blocks(ROOT / "docs/extending.md", "python")
+    file = tmp_path / declaration.splitlines()[0].removeprefix("# ")
+    shutil.copytree(ROOT / "src/guided_lgp", tmp_path / "src/guided_lgp")
+    file.parent.mkdir()
+    file.write_text(declaration, encoding="utf-8")
+    command = [sys.executable, "-c", script]
+    environment = os.environ | {"PYTHONPATH": str(tmp_path / "src")}
+    done = subprocess.run(
+        command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert re.fullmatch(r"\(grasp \S+ red\) \(place \S+ red green\)\n", done.stdout)
+    unchanged = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert "policy 'goals_first': is unknown" in unchanged.stderr
