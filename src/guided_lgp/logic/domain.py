@@ -50,6 +50,8 @@ class GroundInstruction:
 
     def facts_after(self, state: State) -> tuple[Fact, ...]:
         """The facts that hold after it."""
+        if not self.facts:
+            return state.facts
         facts = set(state.facts)
         for predicate, symbols, negated in self.facts:
             (facts.discard if negated else facts.add)((predicate, *symbols))

@@ -1,5 +1,6 @@
 """Which actions a state allows, and the states they lead to."""
 
+from bisect import insort
 from collections.abc import Iterable
 
 from guided_lgp.logic.actions import Action
@@ -17,11 +18,10 @@ def applicable_actions(state: State, symbols: Symbols) -> tuple[Action, ...]:
 def successor(state: State, action: Action) -> State:
     """The state after an applicable action; what stands on the body moves with it."""
     ground = state.domain.bind(action)
-    support, held = dict(state.support), dict(state.held)
-    support.pop(ground.body, None)
-    held.pop(ground.body, None)
-    (held if ground.into_hand else support)[ground.body] = ground.parent
-    return state.domain.state(support, held, ground.facts_after(state))
+    support = [edge for edge in state.support if edge[0] != ground.body]
+    held = [edge for edge in state.held if edge[0] != ground.body]
+    insort(held if ground.into_hand else support, (ground.body, ground.parent))
+    return State(tuple(support), tuple(held), ground.facts_after(state), state.domain)
 
 
 def progress(state: State, actions: Iterable[Action]) -> State:

@@ -73,16 +73,18 @@ class GroundAtom(NamedTuple):
 
     def holds_in(self, state: State) -> bool:
         """Whether it is true in a state."""
-        test = _PREDICATES.get(self.predicate)
-        fact = (self.predicate, *self.symbols)
-        return (fact in state.facts if test is None else test(state, *self.symbols)) != self.negated
+        predicate, symbols, negated = self
+        test = _PREDICATES.get(predicate)
+        if test is None:
+            return ((predicate, *symbols) in state.facts) != negated
+        return bool(test(state, *symbols)) != negated
 
 
 _PREDICATES: Mapping[str, Callable[..., bool]] = {
-    "holds": lambda state, gripper, body: state.holder(body) == gripper,
+    "holds": lambda state, gripper, body: (body, gripper) in state.held,
     "held": lambda state, body: state.holder(body) is not None,
     "free": lambda state, gripper: state.held_by(gripper) is None,
-    "on": lambda state, body, support: state.support_of(body) == support,
+    "on": lambda state, body, support: (body, support) in state.support,
     "clear": lambda state, support: not state.children_of(support),
     "carries": lambda state, body, other: other == body or other in state.carried_by(body),
     "same": lambda state, one, other: one == other,
