@@ -204,7 +204,9 @@ def read_document(file: Path) -> RobotDocument:
     except ValidationError as error:
         first = error.errors()[0]
         field = ".".join(str(part) for part in first["loc"])
-        raise InputError(f"{file}: {field}" if field else str(file), first["msg"]) from None
+        raise InputError(
+            f"{file}: {field}" if field else str(file), first["msg"].removeprefix("Value error, ")
+        ) from None
 
 
 def _whole(name: str, arm: Any, arms: dict[str, Any]) -> Any:
