@@ -98,20 +98,17 @@ class CollisionChecker:
         self._template = pin.neutral(self._model)
         for name, value in scene.robot.fixed_values.items():
             self._template[self._coordinate(name)] = value
-        turning = list(robot.continuous)
-        self._turning = turning
-        self._plain = [i for i in range(len(robot.joint_names)) if i not in turning]
-        at = [self._coordinate(joint) for joint in robot.joint_names]
-        self._plain_at = [at[i] for i in self._plain]
-        self._cosine_at = [at[i] for i in turning]
-        self._sine_at = [index + 1 for index in self._cosine_at]
+        at = np.array([self._coordinate(joint) for joint in robot.joint_names])
+        self._turning = np.array(robot.continuous, dtype=int)
+        self._plain = np.setdiff1d(np.arange(len(at)), self._turning)
+        self._plain_at, self._cosine_at = at[self._plain], at[self._turning]
         self._velocity_at = [
             int(self._model.joints[self._model.getJointId(joint)].idx_v)
             for joint in robot.joint_names
         ]
         self._fingers = {gripper: arm.fingers for gripper, arm in robot.arms.items()}
         self._finger_at = {
-            gripper: [self._coordinate(joint) for joint in fingers.joints]
+            gripper: np.array([self._coordinate(joint) for joint in fingers.joints], dtype=int)
             for gripper, fingers in self._fingers.items()
         }
 
@@ -161,10 +158,12 @@ class CollisionChecker:
 
     def coordinates(self, q: Array, fingers: Mapping[str, float]) -> Array:
         """Coordinates of the pinocchio model (m, nq) for configurations (m, n)."""
-        full = np.tile(self._template, (len(q), 1))
+        full = np.empty((len(q), len(self._template)))
+        full[:] = self._template
         full[:, self._plain_at] = q[:, self._plain]
-        full[:, self._cosine_at] = np.cos(q[:, self._turning])
-        full[:, self._sine_at] = np.sin(q[:, self._turning])
+        angles = q[:, self._turning]
+        full[:, self._cosine_at] = np.cos(angles)
+        full[:, self._cosine_at + 1] = np.sin(angles)
         for gripper, value in fingers.items():
             full[:, self._finger_at[gripper]] = value * self._fingers[gripper].ratios
         return full

@@ -95,6 +95,7 @@ class Mover:
         self.arms = {g: PlacedArm(self.robot, g, base, fixed) for g in self.robot.grippers}
         self._bodies = body_names(scene)
         self._checker = CollisionChecker(scene)
+        self._entered: tuple[Surroundings, JointSpace] | None = None
         self._iterations = iterations
 
     def name_of(self, pair: tuple[str, str]) -> str:
@@ -203,13 +204,13 @@ class Mover:
         return Tool(*arm.forward(q), float(arm.redundancy(q)), arm.branch(q))
 
     def _space(self, surroundings: Surroundings) -> JointSpace:
-        self._checker.enter(surroundings.scene)
-        return JointSpace(
-            self._checker,
-            self.arms[surroundings.scene.gripper],
-            surroundings.q,
-            surroundings.fingers,
-        )
+        """The space of a motion; the checker is there already if it was the last one asked for."""
+        if self._entered is None or self._entered[0] is not surroundings:
+            self._checker.enter(surroundings.scene)
+            arm = self.arms[surroundings.scene.gripper]
+            space = JointSpace(self._checker, arm, surroundings.q, surroundings.fingers)
+            self._entered = surroundings, space
+        return self._entered[1]
 
 
 def _rounded(space: JointSpace, points: list[Array]) -> list[Array]:

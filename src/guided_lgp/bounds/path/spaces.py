@@ -28,7 +28,7 @@ class JointSpace:
         q: Array,
         fingers: Mapping[str, float],
     ) -> None:
-        """The checker's mode must be the one of the motion; ``q`` holds the other arms."""
+        """The checker must have entered the scene of the motion; ``q`` holds the other arms."""
         self._checker = checker
         self._q = q
         self._fingers = fingers
@@ -57,7 +57,8 @@ class JointSpace:
         return values, gradients[..., self._joints]
 
     def _whole(self, path: Array) -> Array:
-        q = np.tile(self._q, (len(path), 1))
+        q = np.empty((len(path), len(self._q)))
+        q[:] = self._q
         q[:, self._joints] = path
         return q
 
