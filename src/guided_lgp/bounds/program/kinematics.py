@@ -100,6 +100,17 @@ class ArmKinematics:
     links: tuple[str, ...]
     """The link of each sphere."""
 
+    @property
+    def left(self) -> float:
+        """1 if the shoulder is on the robot's left or in its middle, -1 on its right."""
+        rotation, position = np.eye(3), np.zeros(3)
+        for joint in self.chain.joints:
+            position = position + rotation @ joint.position
+            rotation = rotation @ joint.rotation
+            if joint.name in self.chain.moving:
+                break
+        return self.side if position[1] >= 0 else -self.side
+
 
 @dataclass(frozen=True, eq=False)
 class RobotKinematics:

@@ -32,7 +32,7 @@ class Offer:
         held, pose = self.configuration.held, self.configuration.pose
         if pose.x < draft.kept:
             return
-        side = draft.robot.arms[held.gripper].side
+        side = draft.robot.arms[held.gripper].left
         candidates = np.empty((_CANDIDATES, 4))
         candidates[:, 0] = draft.generator.uniform(0.4, 0.65, _CANDIDATES)
         candidates[:, 1] = draft.generator.uniform(-0.15, 0.25, _CANDIDATES) * side
@@ -69,7 +69,7 @@ def _variable_pose(context: Context, box: str) -> PlanarPose:
     """Above all that stands."""
     tops = (context.top(name) for name in context.pose if name != box)
     lowest = context.half(box)[2] + _ABOVE + max(tops)
-    side = context.robot.arms[context.held[box].gripper].side
+    side = context.robot.arms[context.held[box].gripper].left
     x, y, z = _PLACE
     return PlanarPose(
         context.program.variable(0.2, 0.9, 0.01, x),
