@@ -148,6 +148,20 @@ def test_any_number_of_symbols_and_goals(
     assert (p > 0).all()
 
 
+@pytest.mark.parametrize("grippers", [["hand"], ["left", "right", "third"]])
+def test_any_number_of_grippers(policy: RelationalPolicy, grippers: list[str]) -> None:
+    symbols = load_domain().symbols(gripper=grippers, box=("red", "blue"), table=("tab1", "tab2"))
+    state = load_domain().state({"red": "tab1"}, {"blue": grippers[0]})
+    rng = np.random.default_rng(1)
+    names = (*symbols.grippers, *symbols.tables)
+    positions = {name: rng.uniform((0.3, -0.5, 0.6), (0.7, 0.5, 0.9)) for name in names}
+    actions = list(applicable_actions(state, symbols))
+    goals = (Goal("on", ("blue", "red")),)
+    p = np.exp(policy.log_probabilities(goals, state, symbols, positions, actions))
+    assert p.shape == (len(actions),)
+    assert p.sum() == pytest.approx(1)
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_torch_and_numpy_agree_and_know_the_applicable_actions(
     network: RelationalNetwork, weights: Weights, seed: int
