@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from guided_lgp.bounds.path.steps import check_motions, manoeuvre
-from guided_lgp.domains import load_domain
+from guided_lgp.domains import domain_names, load_domain
 from guided_lgp.errors import InputError
 from guided_lgp.logic import Action, Domain
 from guided_lgp.logic.declarations import Instruction, Term, Type, attach, free, terms
@@ -38,8 +38,9 @@ def test_other_ways_follow_the_declared_one() -> None:
     assert [way.of(np.eye(3)).tolist() for way in ways] == [[0, 0, 0.05], [-0.05, 0, 0]]
 
 
-def test_the_domains_of_the_project_can_be_moved() -> None:
-    check_motions(load_domain())
+@pytest.mark.parametrize("name", domain_names())
+def test_every_domain_of_the_project_can_be_moved(name: str) -> None:
+    check_motions(load_domain(name))
 
 
 @pytest.mark.parametrize(

@@ -27,9 +27,9 @@ _VISITS = 8
 class PathBound:
     """Finds the motion for a skeleton, starting from its coarse solution.
 
-    The search goes through the actions in order. Box poses come from the coarse solution, grips,
-    elbows and, where needed, placements are chosen anew; an action that cannot be carried out sends
-    the search back to the grasp that it depends on, and in the end to another coarse solution.
+    The search goes through the actions in order. Box poses come from the coarse solution; grips,
+    postures and, where needed, placements are chosen anew. An action that cannot be carried out
+    sends the search back to the one that it depends on, and in the end to another coarse solution.
     """
 
     def __init__(self, scene: Scene, coarse: CoarseBound, solutions: int) -> None:
@@ -105,7 +105,7 @@ class PathBound:
             max(furthest.action, 0),
             furthest.constraint,
             float("nan"),
-            f"{tried} coarse solutions with grips, elbows and placements chosen anew",
+            f"{tried} coarse solutions with grips, postures and placements chosen anew",
         )
         return PathResult(
             skeleton,

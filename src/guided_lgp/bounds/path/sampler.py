@@ -1,7 +1,7 @@
 """The ways to carry out one action: an interpretation of the steps of its declared motion.
 
-For every contact of the hand (grip or place), elbow posture and straight way: first the contact and
-the ends of the straight ways are free, then the ways themselves, then the transits between them.
+For every contact of the hand (grip or place), posture of the arm and straight way: first the
+contact and the ends of the straight ways are free, then the ways, then the transits between them.
 """
 
 from collections.abc import Iterator, Sequence
@@ -21,9 +21,9 @@ from guided_lgp.poses import compose, inverse, pose, rotation_matrix, yaw_of
 _OUTCOMES = 4
 """Ways to carry out an action that are passed on, before an earlier action is changed."""
 _CONFIGURATIONS = 150
-"""Configurations of contact and elbow that are looked at per action and batch of contacts."""
-_ELBOWS = 3
-"""Elbow postures per contact whose motions are planned."""
+"""Configurations at the contact that are looked at per action and batch of contacts."""
+_POSTURES = 3
+"""Postures of the arm per contact from which motions are planned."""
 
 
 class OutcomeSampler:
@@ -102,7 +102,7 @@ class OutcomeSampler:
         if loaded:
             reach = task.level_reach(reach, holder, situation)
         now, around = situation.q[arm.arm.slice], situation.around(holder)
-        for _, value, branch in reach.order()[: 2 * _ELBOWS]:
+        for _, value, branch in reach.order()[: 2 * _POSTURES]:
             goal = arm.near(reach.q[0, 0, value, branch], now)
             if task.blocked(index, Stage.REACH, "presenting", around, goal[None]):
                 continue
@@ -143,7 +143,7 @@ class OutcomeSampler:
         attempts = np.zeros(len(reach.cost), dtype=int)
         for choice in reach.order(contacts.cost)[:_CONFIGURATIONS]:
             number, value, branch = choice
-            if attempts[number] >= _ELBOWS:
+            if attempts[number] >= _POSTURES:
                 continue
             contact, before = reach.q[number, :, None, value, branch]
             if task.blocked(index, Stage.CONTACT, "at the contact", at, contact):
@@ -155,7 +155,7 @@ class OutcomeSampler:
             attempts[number] += 1
             outcome = self._planned(index, situation, reach, choice)
             if outcome is not None:
-                attempts[number] = _ELBOWS
+                attempts[number] = _POSTURES
                 yield outcome
 
     def _planned(
@@ -172,7 +172,8 @@ class OutcomeSampler:
             task.record(index, Stage.LINE_IN, f"{line} on the way in")
             return None
         # Full turns of a joint move the hand in the last bit only, but what is let go of keeps it.
-        at = line[::-1] if action.body in situation.carried else wound(line[::-1], arm, start)
+        held = situation.state.holder(action.body) is not None
+        at = line[::-1] if held else wound(line[::-1], arm, start)
         reached = task.after(situation, [Motion(arm.arm, at)])
         switch = self._switch(index, reached)
         switched = replace(task.after(reached, switch), state=task.states[index + 1])
