@@ -12,7 +12,8 @@ from guided_lgp.errors import InputError
 from guided_lgp.params import Params
 from guided_lgp.paths import METRICS
 from guided_lgp.report import render
-from guided_lgp.report.pages import BEGIN, END, winners, write_pages
+from guided_lgp.report.pages import BEGIN, END, write_pages
+from guided_lgp.report.scalability_tables import winners
 
 FIGURES = {"headline", "scalability", "success", "learning_curves", "confusion"}
 FIGURES |= {"feasible_share", "failures"}
@@ -27,9 +28,9 @@ def test_everything_is_written(rendered: Path) -> None:
     assert figures == {f"{n}.{s}" for n in FIGURES for s in ("png", "svg")} | pictures
     tables = {path.name for path in (reports / "tables").iterdir()}
     names = {"table_1", "unseen", "training", "enumeration", "table_3_details"}
-    names |= {"table_3_tree_size", "table_3_time"}
+    names |= {"table_3_tree_size", "table_3_time", "winners"}
     files = {f"{n}.{s}" for n in names for s in ("md", "tex", "csv")}
-    assert tables == files | {"findings.md"}
+    assert tables == files
     assert {path.name for path in (reports / "replays").iterdir()} == {
         f"{setup}.html" for setup in REPLAYS
     }

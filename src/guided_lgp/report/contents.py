@@ -16,7 +16,7 @@ from guided_lgp.report.document import (
 )
 from guided_lgp.report.inputs import Inputs
 from guided_lgp.report.style import POLICIES
-from guided_lgp.report.table import Table, plain
+from guided_lgp.report.table import Table
 
 COMMAND = "dvc repro"
 
@@ -36,18 +36,10 @@ DIFFERENCES = (
 """Where this work departs from the paper, or had to choose."""
 
 
-def sentences(inputs: Inputs, calls: Mapping[str, float]) -> str:
-    """What the tables say, as a list in Markdown; arguments as those of :func:`compose`."""
-    found = findings.generalization(inputs.generalization, calls)
-    found += findings.scalability(inputs.scalability, inputs.timing)
-    return "".join(f"- {plain(sentence)}\n" for sentence in found)
-
-
 def compose(
     inputs: Inputs,
     params: Params,
     novelty: Mapping[str, str],
-    calls: Mapping[str, float],
     tables: Mapping[str, Table],
     replays: Sequence[tuple[str, str]],
 ) -> Document:
@@ -57,12 +49,10 @@ def compose(
         inputs: for the sentences and the pictures of the setups.
         params: for the seeds.
         novelty: of every objective.
-        calls: by planner, mean number of policy calls per action of the plan.
         tables: by name.
         replays: (address, text) of every replay.
     """
     generalization: list[Block] = [
-        Bullets(findings.generalization(inputs.generalization, calls)),
         tables["table_1"],
         findings.unseen(novelty, _symmetric(params)),
         tables["unseen"],
@@ -74,7 +64,7 @@ def compose(
     ]
     if "draws" in tables:
         more = "The studies: this spread, ablations, data efficiency, feasibility classifier"
-        generalization[2:2] = [tables["draws"], Links([("../docs/studies.md", more)])]
+        generalization[1:1] = [tables["draws"], Links([("../docs/studies.md", more)])]
     scalability: list[Block] = [
         Picture(
             "headline.svg",
@@ -84,7 +74,7 @@ def compose(
             "the paper's means. White dots: means over the problems solved, not all are. Crosses: "
             "stopped at a limit; dotted: that of the tree size.",
         ),
-        Bullets(findings.scalability(inputs.scalability, inputs.timing)),
+        tables["winners"],
         tables["table_3_tree_size"],
         tables["table_3_time"],
         Picture(

@@ -1,6 +1,5 @@
 """Results in the pages for readers: ``docs/results.md``, and the findings of the README."""
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,22 +15,18 @@ from guided_lgp.report.cells import number, percent, search_time
 from guided_lgp.report.drawing import STYLE, save
 from guided_lgp.report.inputs import Metrics, all_solved, compared, read_object
 from guided_lgp.report.style import planner_style
-from guided_lgp.report.table import Table
 from guided_lgp.search.planners import TABLE_3
 
 BEGIN = "<!-- findings: written by make repro -->"
 END = "<!-- end of findings -->"
 RESULTS = Path("docs/results.md")
 IMAGES = Path("docs/images")
-TABLES = ("table_1", "table_3_tree_size", "table_3_time", "table_3_details", "training")
+TABLES = ("winners", "table_1", "table_3_tree_size", "table_3_time", "table_3_details", "training")
 """Files of ``reports/tables`` that the page of results has."""
 OPTIONAL = ("draws", "unseen", "enumeration", "geometry")
 """Those that are there once ``make study`` and ``make bench`` have run."""
 SHOWN = ("breadth_first", "astar", "uniform_best_first", "relational")
 """Planners of the README's figure."""
-_NAMED = 3
-"""How many planners that share a place are named."""
-
 _INTRODUCTION = """\
 # Results
 
@@ -58,8 +53,7 @@ def write_pages(root: Path) -> None:
     shares = read_object(root / METRICS / "generalization.json", "evaluate_generalization")
     (root / IMAGES).mkdir(parents=True, exist_ok=True)
     save(solved(metrics), root / IMAGES, "solved")
-    texts = [_INTRODUCTION, winners(metrics, timing).markdown(), *_tables(root)]
-    write_text(root / RESULTS, "\n".join(texts))
+    write_text(root / RESULTS, "\n".join([_INTRODUCTION, *_tables(root)]))
     _replace(root / "README.md", findings(metrics, timing, shares))
 
 
@@ -81,53 +75,6 @@ def _replace(readme: Path, block: str) -> None:
     if not end:
         raise InputError(str(readme), "has no markers of the findings", f"{BEGIN} and {END}")
     write_text(readme, f"{before}{begin}\n\n{block}\n{end}{after}")
-
-
-def winners(metrics: Metrics, timing: Metrics) -> Table:
-    """Who wins where: of the planners that solve all problems of a class, the first in each figure.
-
-    Args:
-        metrics: by problem and planner.
-        timing: as ``metrics``.
-    """
-    rows = []
-    for problem in compared(metrics):
-        cells = metrics[problem.name]
-        complete = [name for name in TABLE_3 if name in cells and all_solved(cells[name])]
-        nodes = {name: cells[name]["tree_size_mean"] for name in complete}
-        seconds = {name: search_time(timing[problem.name][name]) for name in complete}
-        rows.append(
-            (
-                problem.name,
-                str(problem.k_min),
-                f"{len(complete)} of {len(cells)}",
-                _first(nodes, 1),
-                _first({name: value for name, value in seconds.items() if value is not None}, 2),
-            )
-        )
-    return Table(
-        "winners",
-        "Who wins where",
-        ("Problem", "K", "Planners that solve all", "Fewest nodes", "Least time to search (s)"),
-        tuple(rows),
-        (
-            "Means over the problems of a class, among the planners that solve all of them; equal "
-            "figures share the place. Time to search: symbolic, policy and coarse time, without "
-            "the path bound.",
-        ),
-        labels=1,
-    )
-
-
-def _first(figures: Mapping[str, float], decimals: int) -> str:
-    """The smallest figure as it is printed, and all who have it."""
-    if not figures:
-        return "–"
-    least = number(min(figures.values()), decimals)
-    names = [
-        TABLE_3[name].label for name, value in figures.items() if number(value, decimals) == least
-    ]
-    return f"{'; '.join(names) if len(names) <= _NAMED else f'{len(names)} planners'}: {least}"
 
 
 @mpl.rc_context(STYLE | {"font.size": 10.0, "legend.fontsize": 10.0})

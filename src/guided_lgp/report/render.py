@@ -16,7 +16,7 @@ from guided_lgp.params import BoundsParams, Params
 from guided_lgp.paths import METRICS, REPORTS
 from guided_lgp.policy.split import training_objectives
 from guided_lgp.report import analysis, figures, scalability_figures, scalability_tables, tables
-from guided_lgp.report.contents import compose, sentences
+from guided_lgp.report.contents import compose
 from guided_lgp.report.drawing import save
 from guided_lgp.report.inputs import Inputs, Metrics, compared, load_inputs
 from guided_lgp.report.table import Table
@@ -60,15 +60,13 @@ def run(params: Params, root: Path) -> None:
             ("csv", table.csv()),
         ):
             write_text(reports / "tables" / f"{table.name}.{suffix}", text)
-    found = sentences(inputs, calls)
-    write_text(reports / "tables" / "findings.md", found)
     for name, figure in _figures(inputs, params).items():
         save(figure, reports / "figures", name)
     for setup in inputs.setups:
         scene = inputs.scenes[f"scalability_{setup}"].scenes[0]
         draw_scene(scene, reports / "figures" / f"setup_{setup}.png")
     replays = _replays(inputs, params.bounds, reports)
-    document = compose(inputs, params, novelty, calls, written, replays)
+    document = compose(inputs, params, novelty, written, replays)
     write_text(reports / "report.md", document.markdown())
     write_text(reports / "report.html", document.html(reports))
     logger.info("report: %s", reports / "report.html")

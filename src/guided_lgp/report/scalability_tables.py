@@ -1,21 +1,24 @@
 """Tables on scalability: Table III beside the paper's, and its details."""
 
+from collections.abc import Mapping
+
 from guided_lgp.experiments.problems import ProblemClass
 from guided_lgp.report import paper
 from guided_lgp.report.cells import NONE, number, search_time, solved_suffix, spread
-from guided_lgp.report.inputs import Metrics, compared
+from guided_lgp.report.inputs import Metrics, all_solved, compared
 from guided_lgp.report.table import Table
 from guided_lgp.search.planners import TABLE_3
 
 
 def scalability(metrics: Metrics, timing: Metrics) -> list[Table]:
-    """Table III: tree size and time of every planner beside the paper's, then the details.
+    """Who wins where; Table III beside the paper's; its details.
 
     Args:
         metrics: by problem and planner.
         timing: as ``metrics``.
     """
     return [
+        winners(metrics, timing),
         _comparison("tree_size", metrics, metrics),
         _comparison("time", metrics, timing),
         _details(metrics, timing),
@@ -159,3 +162,54 @@ def _details(metrics: Metrics, timing: Metrics) -> Table:
         labels=2,
         records=records,
     )
+
+
+_NAMED = 3
+"""How many planners that share a place are named."""
+
+
+def winners(metrics: Metrics, timing: Metrics) -> Table:
+    """Who wins where: of the planners that solve all problems of a class, the first in each figure.
+
+    Args:
+        metrics: by problem and planner.
+        timing: as ``metrics``.
+    """
+    rows = []
+    for problem in compared(metrics):
+        cells = metrics[problem.name]
+        complete = [name for name in TABLE_3 if name in cells and all_solved(cells[name])]
+        nodes = {name: cells[name]["tree_size_mean"] for name in complete}
+        seconds = {name: search_time(timing[problem.name][name]) for name in complete}
+        rows.append(
+            (
+                problem.name,
+                str(problem.k_min),
+                f"{len(complete)} of {len(cells)}",
+                _first(nodes, 1),
+                _first({name: value for name, value in seconds.items() if value is not None}, 2),
+            )
+        )
+    return Table(
+        "winners",
+        "Who wins where",
+        ("Problem", "K", "Planners that solve all", "Fewest nodes", "Least time to search (s)"),
+        tuple(rows),
+        (
+            "Means over the problems of a class, among the planners that solve all of them; equal "
+            "figures share the place. Time to search: symbolic, policy and coarse time, without "
+            "the path bound.",
+        ),
+        labels=1,
+    )
+
+
+def _first(figures: Mapping[str, float], decimals: int) -> str:
+    """The smallest figure as it is printed, and all who have it."""
+    if not figures:
+        return "–"
+    least = number(min(figures.values()), decimals)
+    names = [
+        TABLE_3[name].label for name, value in figures.items() if number(value, decimals) == least
+    ]
+    return f"{'; '.join(names) if len(names) <= _NAMED else f'{len(names)} planners'}: {least}"
