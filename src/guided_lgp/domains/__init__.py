@@ -25,6 +25,8 @@ def load_domain(name: str = PAPER) -> Domain:
     """
     if name not in domain_names():
         raise InputError("domain", f"unknown {name!r}", ", ".join(domain_names()))
-    domain = import_module(f"{__name__}.{name}").DOMAIN
-    assert isinstance(domain, Domain)
+    domain = getattr(import_module(f"{__name__}.{name}"), "DOMAIN", None)
+    if not isinstance(domain, Domain) or domain.name != name:
+        accepted = f'DOMAIN = Domain("{name}", ...)'
+        raise InputError(f"{name}.py: DOMAIN", "is missing or has another name", accepted)
     return domain
