@@ -24,19 +24,22 @@ from guided_lgp.policy.registry import POLICIES, load_policy, missing_instructio
 from guided_lgp.scene import Scene, load_scene
 from guided_lgp.scene.validate import validate_scene
 from guided_lgp.search.facts import out_of_reach
-from guided_lgp.search.planners import SEARCHES, Search, check_planners
+from guided_lgp.search.planners import (
+    DEFAULT_SEARCH,
+    SEARCHES,
+    WITHOUT_POLICY,
+    Search,
+    check_planners,
+)
 from guided_lgp.search.policy import Policy, Uniform
 from guided_lgp.search.problem import Problem
 from guided_lgp.search.result import REASONS, Cause, SearchResult, Times
 
-DEFAULT_PLANNER, DEFAULT_POLICY = "complete", "relational"
+DEFAULT_POLICY = "relational"
 
 SEQUENCES_PER_ACTION = 100
 """Sequences that a search may hand to the coarse bound, beyond the limit of the experiments, for
 each action that a task needs at least."""
-
-_WITHOUT_POLICY = "best-first"
-"""The search where the policy cannot score all actions: complete, whatever guides it."""
 
 logger = logging.getLogger(__name__)
 
@@ -82,7 +85,7 @@ class PlanningResult(SearchResult):
 def plan(
     scene: Scene | str | Path,
     objective: str | Iterable[Goal | str],
-    planner: str = DEFAULT_PLANNER,
+    planner: str = DEFAULT_SEARCH,
     *,
     policy: str | Policy = DEFAULT_POLICY,
     models: Path = MODELS,
@@ -154,9 +157,9 @@ def _guidance(
         "the policy has no head for %s of the domain %s: %s search without it",
         ", ".join(missing),
         scene.symbols.domain.name,
-        _WITHOUT_POLICY,
+        WITHOUT_POLICY,
     )
-    return SEARCHES[_WITHOUT_POLICY], Uniform()
+    return SEARCHES[WITHOUT_POLICY], Uniform()
 
 
 def _limits(

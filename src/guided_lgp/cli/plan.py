@@ -13,7 +13,7 @@ from guided_lgp.cli.terminal import AsJson, is_plan, one_of, show, spinner
 from guided_lgp.errors import InputError
 from guided_lgp.paths import MODELS, PLANNING
 from guided_lgp.policy.registry import POLICIES
-from guided_lgp.search.planners import SEARCHES
+from guided_lgp.search.planners import DEFAULT_SEARCH, SEARCHES
 
 app = typer.Typer()
 
@@ -49,7 +49,7 @@ def plan(
             + "; ".join(f"{name}: {search.summary}" for name, search in SEARCHES.items())
             + ".",
         ),
-    ] = "complete",
+    ] = DEFAULT_SEARCH,
     policy: Annotated[
         str,
         typer.Option(
@@ -172,6 +172,7 @@ def plan(
     summary = {
         "solved": result.solved,
         "actions": [str(action) for action in result.skeleton or ()],
+        "reason": result.reason,
         "explanation": result.explanation,
         "obstacles": [obstacle.document() for obstacle in result.obstacles],
         "statistics": statistics,

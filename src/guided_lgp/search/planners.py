@@ -49,6 +49,12 @@ SEARCHES: Mapping[str, Search] = {
 }
 """Every search, by the name under which users ask for it."""
 
+DEFAULT_SEARCH = "complete"
+"""The one for users who do not ask for any."""
+
+WITHOUT_POLICY = "best-first"
+"""The one where a policy cannot score all actions: complete, whatever guides it."""
+
 
 UNIFORM = "uniform"
 """The policy that knows nothing: the control that shows what best-first search owes to its bound on
