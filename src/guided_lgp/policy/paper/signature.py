@@ -13,12 +13,10 @@ from guided_lgp.domains import load_domain
 from guided_lgp.errors import InputError
 from guided_lgp.logic import Action, Domain, Goal, Symbols
 from guided_lgp.logic.declarations import GoalType, Instruction, Type, Variable
+from guided_lgp.logic.symbols import GRIPPER
 
 INSTRUCTION = "instruction"
 """The network, and its one decision, that comes before all others."""
-
-GRIPPER = "gripper"
-"""The logic type of what holds; every other parent is a support."""
 
 
 @dataclass(frozen=True)
