@@ -7,6 +7,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+from pydantic import ValidationError
+
 from guided_lgp.errors import InputError
 
 LARGEST = 2**31
@@ -47,6 +49,14 @@ def _finite(text: str) -> float:
     if not math.isfinite(value):
         raise ValueError(f"{text[:20]} is not a finite number")
     return value
+
+
+def first_fault(error: ValidationError, where: str) -> InputError:
+    """The first fault that pydantic found in a document, in one line with its field."""
+    first = error.errors()[0]
+    field = ".".join(str(part) for part in first["loc"])
+    message = first["msg"].removeprefix("Value error, ")  # what our own validators say
+    return InputError(f"{where}: {field}" if field else where, message)
 
 
 def write_json(path: Path, document: Any) -> None:

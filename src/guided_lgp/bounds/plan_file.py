@@ -16,8 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from guided_lgp.bounds.results import Attachment, Keyframe, PathResult, Trajectory
 from guided_lgp.bounds.verify.attachments import switches_of
-from guided_lgp.documents import read_json, write_text
-from guided_lgp.errors import InputError
+from guided_lgp.documents import first_fault, read_json, write_text
 from guided_lgp.logic import Action, Goal, Objective, Skeleton
 from guided_lgp.poses import yaw_of
 from guided_lgp.scene import Scene
@@ -193,9 +192,7 @@ def read_plan(path: Path) -> Plan:
     try:
         return Plan.model_validate(document)
     except ValidationError as error:
-        first = error.errors()[0]
-        field = ".".join(str(part) for part in first["loc"])
-        raise InputError(f"{path}: {field}" if field else str(path), first["msg"]) from None
+        raise first_fault(error, str(path)) from None
 
 
 def _boxes(keyframe: Keyframe) -> dict[str, object]:

@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal, Self
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from guided_lgp.documents import first_fault
 from guided_lgp.errors import InputError
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
@@ -202,11 +203,7 @@ def read_document(file: Path) -> RobotDocument:
     try:
         return RobotDocument.model_validate(data)
     except ValidationError as error:
-        first = error.errors()[0]
-        field = ".".join(str(part) for part in first["loc"])
-        raise InputError(
-            f"{file}: {field}" if field else str(file), first["msg"].removeprefix("Value error, ")
-        ) from None
+        raise first_fault(error, str(file)) from None
 
 
 def _whole(name: str, arm: Any, arms: dict[str, Any]) -> Any:

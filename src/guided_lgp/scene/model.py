@@ -18,9 +18,8 @@ from pydantic import (
     model_validator,
 )
 
-from guided_lgp.documents import read_json
+from guided_lgp.documents import first_fault, read_json
 from guided_lgp.domains import PAPER, domain_names, load_domain
-from guided_lgp.errors import InputError
 from guided_lgp.logic import State, Symbols
 from guided_lgp.poses import Array, compose, pose
 from guided_lgp.robots import Robot, load_robot
@@ -221,9 +220,7 @@ def parse_scene(document: object, where: str) -> Scene:
     try:
         return Scene.model_validate(document)
     except ValidationError as error:
-        first = error.errors()[0]
-        field = ".".join(str(part) for part in first["loc"])
-        raise InputError(f"{where}: {field}" if field else where, first["msg"]) from None
+        raise first_fault(error, where) from None
 
 
 def load_scene(path: str | Path) -> Scene:
