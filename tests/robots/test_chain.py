@@ -49,14 +49,14 @@ def test_other_joints_keep_their_values() -> None:
     np.testing.assert_allclose(high.points - low.points, np.tile([0, 0, 0.2], (7, 1)))
 
 
-def test_a_placed_chain_moves_with_its_root() -> None:
+def test_a_tool_frame_is_fixed_to_the_last_link() -> None:
     chain = ARMS["panda"].chain
-    turn, shift = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]), np.array([0.5, 0, 1.0])
+    turn, shift = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]), np.array([0.1, 0, 0.2])
     q = np.linspace(-1, 1, 7)
     rotation, position = chain.forward(q)
-    moved_rotation, moved_position = chain.placed(turn, shift).forward(q)
-    np.testing.assert_allclose(moved_rotation, turn @ rotation, atol=1e-12)
-    np.testing.assert_allclose(moved_position, turn @ position + shift, atol=1e-12)
+    turned, moved = chain.extended(turn, shift).forward(q)
+    np.testing.assert_allclose(turned, rotation @ turn, atol=1e-12)
+    np.testing.assert_allclose(moved, position + rotation @ shift, atol=1e-12)
 
 
 def test_links_and_joints_that_do_not_fit_are_named() -> None:

@@ -1,5 +1,6 @@
 """Every robot that ships: its file against pinocchio, and what is derived where it says nothing."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import yaml
 from guided_lgp.errors import InputError
 from guided_lgp.poses import rotation_matrix
 from guided_lgp.robots import Robot, load_robot, robot_names
+from guided_lgp.robots.build import read_robot
 from guided_lgp.robots.chain import read_chain
 from guided_lgp.robots.inverse import InverseKinematics
 
@@ -73,6 +75,19 @@ def test_measures_are_there(robot: Robot) -> None:
         assert np.all(arm.lever_arms[:-1] > 0)
         assert np.all(arm.reaches >= arm.lever_arms - 0.01)
         assert arm.fingers.value(arm.fingers.widest) == pytest.approx(arm.fingers.opened)
+
+
+def test_without_an_srdf_pairs_of_links_are_sampled_once(tmp_path: Path) -> None:
+    text = (_FOLDER / "ur5.yaml").read_text()
+    file = tmp_path / "robot.yaml"
+    file.write_text(re.sub(r"  srdf: .*\n", "", text))
+    sampled = load_robot(str(file))
+    assert sampled.disabled_pairs <= load_robot("ur5").disabled_pairs
+    assert frozenset(("upper_arm_link", "forearm_link")) in sampled.disabled_pairs
+    kept = sampled.urdf.with_suffix(".pairs.json")
+    before = kept.stat().st_mtime_ns
+    assert read_robot(file).disabled_pairs == sampled.disabled_pairs
+    assert kept.stat().st_mtime_ns == before
 
 
 def test_signs_of_a_mirrored_arm_are_found(tmp_path: Path) -> None:

@@ -62,16 +62,6 @@ class Chain:
     def __len__(self) -> int:
         return len(self.joints)
 
-    def placed(self, rotation: Array, position: Array) -> "Chain":
-        """The same chain with its root at a pose of another frame."""
-        return replace(
-            self,
-            axes=self.axes @ rotation.T,
-            points=self.points @ rotation.T + position,
-            rotation=rotation @ self.rotation,
-            position=rotation @ self.position + position,
-        )
-
     def extended(self, rotation: Array, position: Array) -> "Chain":
         """The same chain with the tool frame at a pose in the present one."""
         return replace(
