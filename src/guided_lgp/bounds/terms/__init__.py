@@ -1,7 +1,8 @@
 """The vocabulary of constraints: one file per term, found by its name.
 
 A term has a kernel (symbolic), the variables that it needs, what a start chooses for them, and a
-numeric check that shares no code with the kernel. Declarations of instructions list terms by name.
+numeric check that shares no code with the kernel: a function of its file, or for ``clear``,
+``apart`` and ``beside`` the overlap of hulls in PyBullet. Instructions declare terms by name.
 """
 
 from functools import cache
