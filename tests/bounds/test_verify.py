@@ -304,7 +304,7 @@ def test_no_point_goes_farther_than_a_step_between_two_checks(
             moved = np.linalg.norm(np.diff(np.concatenate(points, axis=1), axis=0), axis=-1)
             farthest = np.maximum(farthest, moved.max(axis=1))
             turns = np.abs(np.diff(q[:, PR2.arms[gripper].slice], axis=0)).sum(axis=0)
-            levers = max(levers, float(turns @ (PR2.lever_arms[PR2.arms[gripper].slice] + beyond)))
+            levers = max(levers, float(turns @ (PR2.arms[gripper].lever_arms + beyond)))
         assert farthest.max() <= 1.01 * STEP
         assert len(samples) < 0.75 * levers / STEP
 

@@ -43,7 +43,7 @@ def test_forward_kinematics_agree_with_pinocchio(gripper: str) -> None:
         assert np.abs(rotation - rotation_matrix(expected[3:])).max() < 1e-9
         for sphere, centre in zip(CHAIN.spheres, spheres.T, strict=True):
             link = gripper[-1].lower() + sphere.link[1:]
-            local = apply(inverse_pose(SCENE.robot.link_pose(q, link)), centre)
+            local = apply(inverse_pose(SCENE.robot.link_poses(q[None], (link,))[0, 0]), centre)
             assert np.abs(local - np.array(sphere.centre) * (1, side, 1)).max() < 1e-9
 
 

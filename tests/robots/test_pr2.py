@@ -141,7 +141,7 @@ def test_lever_bounds_the_way_of_the_tool(turned: Scene) -> None:
             way = np.linalg.norm(
                 turned.robot.tool_pose(moved, gripper)[:3] - turned.robot.tool_pose(q, gripper)[:3]
             )
-            assert way <= 0.01 * PR2.lever_arms[joint] + 1e-9
+            assert way <= 0.01 * PR2.arms[gripper].lever_arms[joint % 7] + 1e-9
 
 
 def test_grasp_poses_close_across_the_narrow_side_with_the_palm_at_the_box() -> None:

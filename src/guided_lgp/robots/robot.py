@@ -224,11 +224,6 @@ class Robot:
         return np.concatenate([arm.acceleration_limits for arm in self.arms.values()])
 
     @cached_property
-    def lever_arms(self) -> Array:
-        """(n,) m; see :attr:`Arm.lever_arms`."""
-        return np.concatenate([arm.lever_arms for arm in self.arms.values()])
-
-    @cached_property
     def continuous(self) -> tuple[int, ...]:
         """Indices into a configuration of the joints that turn without end."""
         joints = self.description.joints

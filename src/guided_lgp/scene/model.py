@@ -87,17 +87,13 @@ class PlacedRobot(BaseModel):
         half = (*self.description.stand, self.height / 2)
         return (Column(half, pose((*self.base[:2], self.height / 2), self.base[2])),)
 
-    def link_pose(self, q: Array, link: str) -> Array:
-        """Pose (7,) of a link's frame in the world (forward kinematics by pinocchio).
+    def link_poses(self, q: Array, links: Sequence[str]) -> Array:
+        """Poses (T, len(links), 7) of links' frames in the world (forward kinematics by pinocchio).
 
         Args:
-            q: configuration (n,) in rad.
-            link: name in the URDF; the fingers are at zero.
+            q: motion (T, n) in rad.
+            links: names in the URDF; the fingers are at zero.
         """
-        return np.asarray(self.link_poses(np.asarray(q)[None], (link,))[0, 0])
-
-    def link_poses(self, q: Array, links: Sequence[str]) -> Array:
-        """Poses (T, len(links), 7) of links along a motion q (T, n); see :meth:`link_pose`."""
         kinematics = self.description.kinematics
         return compose(self.base_pose, kinematics.link_poses(q, self.fixed_values, links))
 
