@@ -53,7 +53,7 @@ def test_what_a_configuration_reaches_is_never_denied(
     count = 300
     q = np.tile(robot.home, (count, 1))
     q[:, arm.slice] = generator.uniform(*arm.limits.T, (count, len(arm.joints)))
-    poses = np.array([placed.link_pose(row, arm.tool_link) for row in q])
+    poses = placed.link_poses(q, (arm.tool_link,))[:, 0]
     tool = np.array([rotation_matrix(pose[3:])[:, 0] for pose in poses])
     wrist = poses[:, :3] - limb.hand * tool + _balls(generator, count, spread)
     pan = q[:, arm.slice][:, 0] + generator.uniform(-spread, spread, count)
