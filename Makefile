@@ -15,9 +15,10 @@ setup: $(INSTALLED)
 $(VENV)/bin/pip:
 	$(PYTHON) -m venv $(VENV)
 
-$(INSTALLED): requirements.lock pyproject.toml | $(VENV)/bin/pip
+$(INSTALLED): requirements.lock requirements-torch.lock pyproject.toml | $(VENV)/bin/pip
 	@echo "Installing the locked packages; this takes a few minutes."
-	$(BIN)/pip install -qq -r requirements.lock
+	$(BIN)/pip install -qq --no-deps -r requirements.lock
+	$(BIN)/pip install -qq --no-deps -r requirements-torch.lock
 	$(BIN)/pip install -qq --no-deps -e .
 	touch $@
 

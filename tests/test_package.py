@@ -1,6 +1,7 @@
 """The wheel, in an environment with nothing but what it declares: planning from an empty folder."""
 
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -156,6 +157,17 @@ def test_ship_takes_the_weights_and_limits_of_a_clone(tmp_path: Path) -> None:
     assert f"{params['generate_scenes']['training_configurations']} random scenes" in (
         (tmp_path / "models" / CARD).read_text()
     )
+
+
+def test_the_lock_pins_every_file() -> None:
+    lines = (ROOT / "requirements.lock").read_text().splitlines()
+    assert len(lines) > 100
+    for line in lines:
+        assert re.fullmatch(r"[\w.-]+==[\w.+!-]+ --hash=sha256:[0-9a-f]{64}", line), line
+    locked = {re.sub(r"[-_.]+", "-", line.partition("==")[0]).lower() for line in lines}
+    required = needed("guided-lgp", "test", "lint").keys() - {"guided-lgp", "torch"}
+    assert {re.sub(r"[-_.]+", "-", name).lower() for name in required} <= locked
+    assert (ROOT / "requirements-torch.lock").read_text().startswith("torch==")
 
 
 def test_the_version_is_said_once() -> None:

@@ -15,7 +15,7 @@ from guided_lgp.errors import InputError
 from guided_lgp.paths import DESCRIPTIONS, MODELS, SOURCES
 from guided_lgp.policy.registry import POLICIES, load_policy
 
-_INSTALL = f"pip install -r {SOURCES / 'requirements.lock'}"
+_INSTALL = f"make -C {SOURCES} setup"
 
 
 @dataclass(frozen=True)
@@ -37,8 +37,9 @@ def examine() -> list[Finding]:
 
 
 def _python() -> Finding:
-    hint = "" if sys.version_info < (3, 12) else "PyBullet was built here; 3.11 has a wheel of it"
-    return Finding("Python", sys.version_info >= (3, 11), platform.python_version(), hint)
+    ok = sys.version_info[:2] == (3, 11)
+    mend = "" if ok else "make a virtual environment with 3.11, for which PyBullet has a wheel"
+    return Finding("Python", ok, platform.python_version(), mend)
 
 
 def _packages() -> Finding:
@@ -46,8 +47,8 @@ def _packages() -> Finding:
     if not lock.is_file():
         return Finding("Packages", True, "no requirements.lock beside the package: not compared")
     wrong = []
-    for line in lock.read_text(encoding="utf-8").split():
-        name, _, wanted = line.partition("==")
+    for line in lock.read_text(encoding="utf-8").splitlines():
+        name, _, wanted = line.partition(" ")[0].partition("==")
         try:
             found = metadata.version(name).partition("+")[0]
         except metadata.PackageNotFoundError:
