@@ -1,56 +1,57 @@
-"""C code, compiled once per content."""
+"""C code, compiled once per content, machine and compiler."""
 
 import ctypes
-import fcntl
+import logging
 import os
+import platform
 import shutil
+import signal
 import subprocess
 import sys
-import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from hashlib import sha256
 from importlib.util import find_spec
 from pathlib import Path
 
-from guided_lgp.errors import InputError
+from guided_lgp.cache import is_whole, made, private_folder
 
 _FLAGS = ("-O2", "-fPIC", "-shared", "-fno-math-errno")
+_LONGEST = 120.0
+"""Seconds that a compiler may take; the first run of ziglang's takes a quarter of it."""
+_PROBE = "guided_lgp_probe"
+_CHECK = """
+import ctypes, sys
+library, name, answer = sys.argv[1:]
+sys.exit(getattr(ctypes.CDLL(library), name)() != int(answer))
+"""
+"""Run in a process of its own: half a library ends the process that opens it."""
 
-
-def cache_folder() -> Path:
-    """Where compiled code is kept: ``$XDG_CACHE_HOME/guided-lgp``."""
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "guided-lgp"
+logger = logging.getLogger(__name__)
 
 
 def load_compiled(name: str, source: str) -> ctypes.CDLL | None:
     """The library made of C code, or None if it is not there and no compiler works.
 
-    The file's name depends on the content, and it is put in place atomically. Of several processes
-    that need it, one compiles and the others wait.
+    It lies in the private cache, is opened only if its content is the one that was written, and
+    was written only after it had answered a probe.
 
     Args:
         name: what the file's name begins with.
         source: the code.
 
     Raises:
-        InputError: the cache folder cannot be written.
+        InputError: the cache folder cannot be used.
     """
-    digest = sha256("\n".join((source, sys.platform, *_FLAGS)).encode()).hexdigest()[:16]
-    target = cache_folder() / f"{name}-{digest}.so"
-    if not target.exists():
-        commands = list(_compilers())
-        if not commands:
-            return None
-        try:
-            target.parent.mkdir(parents=True, exist_ok=True)
-            with _alone(target.with_suffix(".lock")):
-                if not target.exists() and not _make(source, commands, target):
-                    return None
-        except OSError as error:
-            fault = error.strerror or "cannot be written"
-            raise InputError(str(target.parent), fault, "a writable $XDG_CACHE_HOME") from None
-    return ctypes.CDLL(str(target))
+    digest = sha256("\n".join((source, sys.platform, *_FLAGS)).encode()).hexdigest()
+    answer = int(digest[:6], 16)
+    code = f"{source}\nint {_PROBE}(void) {{ return {answer}; }}\n"
+    commands = list(_compilers())
+    file = _any_made(name, digest) if not commands else None
+    if commands:
+        entry = f"{name}-{platform.machine()}-{_identity(commands[0])}-{digest[:16]}.so"
+        file = made(entry, lambda folder: _make(code, commands, answer, folder))
+    return None if file is None else ctypes.CDLL(str(file))
 
 
 def _compilers() -> Iterator[list[str]]:
@@ -63,33 +64,50 @@ def _compilers() -> Iterator[list[str]]:
         yield [sys.executable, "-m", "ziglang", "cc"]
 
 
-@contextmanager
-def _alone(file: Path) -> Iterator[None]:
-    """Wait until no other process is in here; the lock of one that dies ends with it.
-
-    Where the file system has no locks, nobody waits and the last one's result stays.
-    """
-    with file.open("w") as stream:
-        with suppress(OSError):
-            fcntl.flock(stream, fcntl.LOCK_EX)
-        yield
+def _identity(command: Sequence[str]) -> str:
+    """Another for another compiler or version of it, without running it."""
+    path = Path(command[0]).resolve()
+    found = path.stat()
+    words = (str(path), str(found.st_size), str(found.st_mtime_ns), *command[1:])
+    return sha256("\n".join(words).encode()).hexdigest()[:8]
 
 
-def _make(source: str, commands: list[list[str]], target: Path) -> bool:
-    """Whether one of the compilers makes the library."""
-    with tempfile.TemporaryDirectory(dir=target.parent) as folder:
-        code, library = Path(folder) / "code.c", Path(folder) / "code.so"
-        code.write_text(source, encoding="utf-8")
-        if not any(_compile(command, code, library) for command in commands):
-            return False
-        library.replace(target)
-    return True
+def _any_made(name: str, digest: str) -> Path | None:
+    """A library that a compiler has made which is gone by now."""
+    found = private_folder().glob(f"{name}-{platform.machine()}-*-{digest[:16]}.so")
+    return next(filter(is_whole, sorted(found)), None)
 
 
-def _compile(command: list[str], code: Path, library: Path) -> bool:
-    arguments = [*command, *_FLAGS, "-o", str(library), str(code), "-lm"]
+def _make(
+    source: str, commands: Sequence[Sequence[str]], answer: int, folder: Path
+) -> bytes | None:
+    """The library of the first compiler whose library works."""
+    code, library = folder / "code.c", folder / "code.so"
+    code.write_text(source, encoding="utf-8")
+    check = [sys.executable, "-I", "-S", "-c", _CHECK, str(library), _PROBE, str(answer)]
+    for command in commands:
+        arguments = [*command, *_FLAGS, "-o", str(library), str(code), "-lm"]
+        if _runs(arguments) and _runs(check):
+            return library.read_bytes()
+        logger.warning("%s makes no library that works", " ".join(command))
+    return None
+
+
+def _runs(arguments: Sequence[str]) -> bool:
+    """Whether a program ends well and in time; with it end all that it has started."""
+    quiet = subprocess.DEVNULL
     try:
-        finished = subprocess.run(arguments, capture_output=True, timeout=600, check=False)
-    except (OSError, subprocess.TimeoutExpired):
+        process = subprocess.Popen(
+            arguments, stdin=quiet, stdout=quiet, stderr=quiet, start_new_session=True
+        )
+    except OSError:
         return False
-    return finished.returncode == 0
+    try:
+        return process.wait(_LONGEST) == 0
+    except subprocess.TimeoutExpired:
+        logger.warning("%s has not ended after %g s", arguments[0], _LONGEST)
+        return False
+    finally:
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()

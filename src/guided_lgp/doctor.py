@@ -78,7 +78,7 @@ def _compiler() -> Finding:
 
 def _cache() -> Finding:
     try:
-        from guided_lgp.compiled import cache_folder
+        from guided_lgp.cache import cache_folder
 
         folder = cache_folder()
         folder.mkdir(parents=True, exist_ok=True)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from guided_lgp import compiled
+from guided_lgp import cache, compiled
 from guided_lgp.bounds.coarse import compiler, solver
 from guided_lgp.bounds.coarse.formulation import Formulator
 from guided_lgp.bounds.coarse.solver import Compiled, Interpreter, Settings
@@ -97,7 +97,7 @@ def test_of_two_processes_one_compiles_and_the_other_waits(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     assert compiler.load_library(load_robot("pr2")) is not None
-    library = next(compiled.cache_folder().glob("coarse-*.so"))
+    library = next(cache.cache_folder().glob("coarse-*.so"))
     stand_in = tmp_path / "bin" / "cc"
     stand_in.parent.mkdir()
     stand_in.write_text(COMPILER.format(log=tmp_path / "log", library=library))
@@ -113,7 +113,7 @@ assert load_library(load_robot("pr2"))
     assert [process.wait(60) for process in both] == [0, 0]
     assert compiler.load_library(load_robot("pr2")) is not None
     assert (tmp_path / "log").read_text().count("compiled") == 1
-    assert not list((tmp_path / "cache" / "guided-lgp").glob("tmp*"))
+    assert not list((tmp_path / "cache" / "guided-lgp").glob(".unfinished*"))
 
 
 def test_a_cache_folder_that_cannot_be_written_is_named(

@@ -2,7 +2,6 @@
 
 import json
 import os
-import tempfile
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from guided_lgp.cache import kept, made
 from guided_lgp.errors import InputError
 from guided_lgp.paths import DESCRIPTIONS
 from guided_lgp.robots.document import DescriptionFiles
@@ -101,8 +101,7 @@ class Description:
         A copy in the user's cache folder (``$XDG_CACHE_HOME/guided-lgp``): meshes have the path of
         the installed files; pure frames, which have no inertia, get a mass of 1 g, where PyBullet
         would assume 1 kg; and meshes without normals, which would be drawn black, are drawn from
-        repaired copies. Files are written once, atomically, under names that depend on their
-        content.
+        repaired copies. Their names depend on their content.
         """
         text = self.source.read_text(encoding="utf-8")
         root = ET.fromstring(text)
@@ -116,7 +115,7 @@ class Description:
                 ET.SubElement(inertial, "inertia", moments | {"ixy": "0", "ixz": "0", "iyz": "0"})
         for mesh in root.findall("link/visual/geometry/mesh"):
             mesh.set("filename", str(_with_normals(Path(mesh.get("filename", "")))))
-        return _cached(self.source.stem, "urdf", ET.tostring(root))
+        return _by_content(self.source, ET.tostring(root))
 
     @cached_property
     def disabled_pairs(self) -> frozenset[frozenset[str]]:
@@ -145,12 +144,14 @@ class Description:
     @cached_property
     def _sampled_pairs(self) -> frozenset[frozenset[str]]:
         """Sampled once per content of the description, and kept beside its copy."""
-        file = self.urdf.with_suffix(".pairs.json")
-        if not file.exists():
-            ranges = {name: joint.limits or (-np.pi, np.pi) for name, joint in self.joints.items()}
-            pairs = sorted(sorted(pair) for pair in sampled_pairs(self.urdf, ranges))
-            _write(file, json.dumps(pairs).encode())
+        file = made(f"{self.urdf.stem}.pairs.json", lambda _: self._pairs_document())
+        assert file is not None  # a document is always made
         return frozenset(map(frozenset, json.loads(file.read_text(encoding="utf-8"))))
+
+    def _pairs_document(self) -> bytes:
+        ranges = {name: joint.limits or (-np.pi, np.pi) for name, joint in self.joints.items()}
+        pairs = sorted(sorted(pair) for pair in sampled_pairs(self.urdf, ranges))
+        return json.dumps(pairs).encode()
 
     def require_links(self, field: str, *links: str) -> None:
         """Check that the URDF has some links.
@@ -303,7 +304,7 @@ def _with_normals(mesh: Path) -> Path:
     normals = np.cross(sides[:, 0], sides[:, 1])
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     facets["normal"] = normals / np.maximum(lengths, 1e-12)
-    return _cached(mesh.stem, "stl", content[:_STL_HEADER] + facets.tobytes())
+    return _by_content(mesh, content[:_STL_HEADER] + facets.tobytes())
 
 
 def _facets(content: bytes) -> np.ndarray | None:
@@ -314,25 +315,6 @@ def _facets(content: bytes) -> np.ndarray | None:
     return np.frombuffer(content, _STL_FACET, offset=_STL_HEADER).copy()
 
 
-def _cached(name: str, suffix: str, content: bytes) -> Path:
-    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    target = Path(base) / "guided-lgp" / f"{name}-{sha256(content).hexdigest()[:16]}.{suffix}"
-    if not target.exists():
-        _write(target, content)
-    return target
-
-
-def _write(target: Path, content: bytes) -> None:
-    """Write a file of the cache folder, atomically.
-
-    Raises:
-        InputError: the folder cannot be written.
-    """
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=target.parent, delete=False) as file:
-            file.write(content)
-        Path(file.name).replace(target)
-    except OSError as error:
-        fault = error.strerror or "cannot be written"
-        raise InputError(str(target.parent), fault, "a writable $XDG_CACHE_HOME") from None
+def _by_content(source: Path, content: bytes) -> Path:
+    """A copy in the cache with another content, which is in its name."""
+    return kept(f"{source.stem}-{sha256(content).hexdigest()[:16]}{source.suffix.lower()}", content)

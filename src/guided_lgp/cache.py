@@ -1,0 +1,186 @@
+"""A private folder for what is made once per machine: compiled code, ready robot files.
+
+Nothing of it is trusted that another user could have put there, and nothing whose content is not
+the one that was written: such an entry is made again. Only the folders above are trusted.
+"""
+
+import fcntl
+import logging
+import os
+import stat
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from hashlib import sha256
+from pathlib import Path
+
+from guided_lgp.errors import InputError
+
+ACCEPTED = "a writable $XDG_CACHE_HOME of one's own"
+_OTHERS = stat.S_IWGRP | stat.S_IWOTH
+_DIGEST, _LOCK, _UNFINISHED = ".sha256", ".lock", ".unfinished-"
+
+logger = logging.getLogger(__name__)
+
+
+def cache_folder() -> Path:
+    """Where it is: ``$XDG_CACHE_HOME/guided-lgp``; a relative path there does not count."""
+    base = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    try:
+        return (base if base.is_absolute() else Path.home() / ".cache") / "guided-lgp"
+    except RuntimeError:
+        raise InputError("$XDG_CACHE_HOME", "is not set, and there is no home", ACCEPTED) from None
+
+
+def private_folder() -> Path:
+    """The folder, made if need be, such that nobody else can write to it.
+
+    Raises:
+        InputError: it cannot be made, is a symbolic link or belongs to another user.
+    """
+    folder = cache_folder()
+    with _named_errors(folder):
+        with suppress(FileExistsError):
+            folder.parent.mkdir(parents=True, exist_ok=True)
+            folder.mkdir(mode=0o700)
+        found = folder.lstat()
+        if not stat.S_ISDIR(found.st_mode):
+            raise InputError(str(folder), "is not a folder", ACCEPTED)
+        if found.st_uid != os.geteuid():
+            raise InputError(str(folder), "belongs to another user", ACCEPTED)
+        if stat.S_IMODE(found.st_mode) != 0o700:
+            folder.chmod(0o700)
+    return folder
+
+
+def kept(name: str, content: bytes) -> Path:
+    """The file of this name, written unless it has this content already.
+
+    Raises:
+        InputError: the folder cannot be used.
+    """
+    file = private_folder() / name
+    if _content(file) != content:
+        with _named_errors(file.parent):
+            _put(file, content)
+    return file
+
+
+def made(name: str, make: Callable[[Path], bytes | None]) -> Path | None:
+    """The file of this name, made unless it is whole; one process makes it, the others wait.
+
+    Args:
+        name: of the file; the same for the same content.
+        make: what makes the content, or nothing; it may use the empty folder that it gets.
+
+    Raises:
+        InputError: the folder cannot be used.
+    """
+    file = private_folder() / name
+    if is_whole(file):
+        return file
+    with _named_errors(file.parent), _alone(file):
+        if is_whole(file):  # made by the process that this one has waited for
+            return file
+        if os.path.lexists(file):
+            logger.warning("%s is damaged and made again", file)
+        prefix = f"{_UNFINISHED}{name}-"
+        for leftover in file.parent.glob(f"{prefix}*"):  # of a process that was killed
+            _remove(leftover)
+        with tempfile.TemporaryDirectory(prefix=prefix, dir=file.parent) as folder:
+            content = make(Path(folder))
+        if content is None:
+            return None
+        _put(file, content)
+        _put(_digest_of(file), sha256(content).hexdigest().encode())
+    return file
+
+
+def is_whole(file: Path) -> bool:
+    """Whether a file that was made is there with the content that was written."""
+    content = _content(file)
+    return (
+        content is not None and _content(_digest_of(file)) == sha256(content).hexdigest().encode()
+    )
+
+
+def damaged() -> list[Path]:
+    """Entries of the folder that will be made again: without their digest, or with another."""
+    entries = [file for file in private_folder().iterdir() if _digest_of(file).exists()]
+    return sorted(file for file in entries if not is_whole(file))
+
+
+def clear() -> None:
+    """Take everything out of the folder; it is made again when it is needed."""
+    folder = private_folder()
+    with _named_errors(folder):
+        for entry in folder.iterdir():
+            _remove(entry)
+
+
+def _digest_of(file: Path) -> Path:
+    return file.with_name(f"{file.name}{_DIGEST}")
+
+
+def _content(file: Path) -> bytes | None:
+    """What is in a plain file that this user alone can write to; None of any other."""
+    try:
+        descriptor = os.open(file, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
+    except OSError:
+        return None
+    with os.fdopen(descriptor, "rb") as stream, suppress(OSError):
+        found = os.fstat(descriptor)
+        mine = stat.S_ISREG(found.st_mode) and found.st_uid == os.geteuid()
+        if mine and not found.st_mode & _OTHERS:
+            return stream.read()
+    return None
+
+
+def _put(file: Path, content: bytes) -> None:
+    """Put a file in place whole, instead of whatever is there; links are replaced, not followed."""
+    descriptor, unfinished = tempfile.mkstemp(prefix=f"{_UNFINISHED}{file.name}-", dir=file.parent)
+    try:
+        with os.fdopen(descriptor, "wb") as stream:
+            stream.write(content)
+        if file.is_dir() and not file.is_symlink():
+            _remove(file)
+        Path(unfinished).replace(file)
+    finally:
+        Path(unfinished).unlink(missing_ok=True)
+
+
+@contextmanager
+def _alone(file: Path) -> Iterator[None]:
+    """Wait until no other process makes this file; the lock of one that dies ends with it.
+
+    Where the file system has no locks, nobody waits and the last one's result stays.
+    """
+    lock = file.with_name(f"{file.name}{_LOCK}")
+    if lock.is_symlink():
+        lock.unlink()
+    flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
+    descriptor = os.open(lock, flags, 0o600)
+    try:
+        with suppress(OSError):
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def _remove(entry: Path) -> None:
+    if entry.is_dir() and not entry.is_symlink():
+        for inner in entry.iterdir():
+            _remove(inner)
+        entry.rmdir()
+    else:
+        entry.unlink(missing_ok=True)
+
+
+@contextmanager
+def _named_errors(folder: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        fault = error.strerror or "cannot be written"
+        raise InputError(str(folder), fault, ACCEPTED) from None
