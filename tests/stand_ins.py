@@ -1,4 +1,8 @@
-"""What stands in for the bounds where a test needs no geometry."""
+"""What stands in for the bounds where a test needs no geometry, and for a full disk."""
+
+import resource
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from guided_lgp.bounds.results import CoarseResult, Failure, PathResult
 from guided_lgp.logic import Skeleton
@@ -24,3 +28,14 @@ class NothingOnBlue:
     def path(self, skeleton: Skeleton) -> PathResult:
         feasible = all(action.symbols[2:] != ("green",) for action in skeleton)
         return PathResult(skeleton, feasible, failure=None if feasible else FAILURE, time_s=2.0)
+
+
+@contextmanager
+def full_disk() -> Iterator[None]:
+    """Here no file gets longer than 500 bytes."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (500, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)

@@ -2,6 +2,9 @@
 
 import json
 import math
+import os
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,7 +14,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from guided_lgp import documents
-from guided_lgp.documents import read_json, write_json, written_whole
+from guided_lgp.documents import read_json, write_json, write_text, written_whole
 from guided_lgp.errors import InputError
 
 CONTENT = np.random.default_rng(1).bytes(2**20)
@@ -98,6 +101,7 @@ def test_a_full_disk_leaves_what_was_there(name: str, tmp_path: Path) -> None:
 
     def write() -> None:
         with written_whole(file) as unfinished:
+            unfinished.unlink()
             unfinished.symlink_to("/dev/full")
             WRITERS[name](unfinished)
 
@@ -113,7 +117,45 @@ def test_a_full_disk_leaves_what_was_there(name: str, tmp_path: Path) -> None:
     assert file.stat().st_size >= 2**20
 
 
-def test_a_writer_that_was_killed_is_followed_by_another(tmp_path: Path) -> None:
+WRITER = """
+import os, sys
+from pathlib import Path
+from guided_lgp.documents import written_whole
+with written_whole(Path(sys.argv[1])) as unfinished:
+    unfinished.write_text('{"half')
+    print("writing", flush=True)
+    sys.stdin.read()
+"""
+
+
+def writer(file: Path) -> subprocess.Popen[str]:
+    """A process in the middle of writing a file."""
+    command = [sys.executable, "-c", WRITER, str(file)]
+    process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    assert process.stdout.readline() == "writing\n"
+    return process
+
+
+def test_leftovers_of_a_killed_writer_go_and_those_of_a_living_one_stay(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "file.json"
+    killed, living = writer(file), writer(file)
+    killed.kill()
+    killed.wait()
+    assert not file.exists()
+    assert len(names(tmp_path)) == 2
+    monkeypatch.setattr(documents, "_LEFTOVER_S", -1.0)
+    write_json(file, {})
+    assert len(names(tmp_path)) == 2  # the file, and what the other writes
+    living.communicate("")
+    assert living.returncode == 0
+    assert names(tmp_path) == ["file.json"]
+    assert file.read_text() == '{"half'
+
+
+def test_an_interrupted_writer_leaves_nothing(tmp_path: Path) -> None:
     file = tmp_path / "file.json"
 
     def write() -> None:
@@ -123,9 +165,67 @@ def test_a_writer_that_was_killed_is_followed_by_another(tmp_path: Path) -> None
 
     with pytest.raises(KeyboardInterrupt):
         write()
-    assert not file.exists()
+    assert names(tmp_path) == []
+
+
+RACER = """
+import sys
+from pathlib import Path
+from guided_lgp.documents import write_text
+for _ in range(100):
+    write_text(Path(sys.argv[1]), sys.argv[2] * 20_000)
+"""
+
+
+def test_of_four_writers_no_reader_sees_a_mixture(tmp_path: Path) -> None:
+    file = tmp_path / "file.txt"
+    command = [sys.executable, "-c", RACER, str(file)]
+    writers = [subprocess.Popen([*command, letter]) for letter in "abcd"]
+    whole = {letter * 20_000 for letter in "abcd"}
+    reads = 0
+    while any(process.poll() is None for process in writers):
+        if file.exists():
+            reads += 1
+            assert file.read_text() in whole
+    assert [process.returncode for process in writers] == [0] * 4
+    assert reads > 20
+    assert names(tmp_path) == ["file.txt"]
+
+
+def test_a_planted_link_is_replaced_and_a_mode_is_kept(tmp_path: Path) -> None:
+    victim, file, secret = tmp_path / "victim", tmp_path / "file.json", tmp_path / "secret.json"
+    victim.write_text("mine")
+    file.symlink_to(victim)
     write_json(file, {})
-    assert names(tmp_path) == ["file.json"]
+    assert victim.read_text() == "mine"
+    assert not file.is_symlink()
+    secret.touch(mode=0o600)
+    write_json(secret, {})
+    assert secret.stat().st_mode & 0o777 == 0o600
+
+
+def test_a_name_as_long_as_the_file_system_takes(tmp_path: Path) -> None:
+    file = tmp_path / ("ü" * 125 + ".json")
+    write_json(file, {})
+    assert names(tmp_path) == [file.name]
+
+
+def test_a_pipe_and_a_device_stay_what_they_are(
+    tmp_path: Path, capfdbinary: pytest.CaptureFixture[bytes]
+) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    read = subprocess.Popen(["cat", str(pipe)], stdout=subprocess.PIPE)
+    write_text(pipe, "röd")
+    assert read.communicate()[0] == "röd".encode()
+    assert pipe.is_fifo()
+    write_text(Path("/dev/null"), "röd")
+    assert Path("/dev/null").is_char_device()
+    with pytest.raises(InputError, match="/dev/full: cannot be written: No space left on device"):
+        write_text(Path("/dev/full"), "röd")
+    write_text(Path("-"), "röd")
+    sys.stdout.flush()
+    assert capfdbinary.readouterr().out == "röd".encode()
 
 
 def test_a_folder_that_cannot_be_made(tmp_path: Path) -> None:

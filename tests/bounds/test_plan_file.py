@@ -14,6 +14,7 @@ from guided_lgp.bounds.verify import verify_path
 from guided_lgp.errors import InputError
 from guided_lgp.logic import parse_objective, parse_skeleton
 from guided_lgp.scene.world import World
+from stand_ins import full_disk
 
 SCENE = scene(red=(0.5, 0.3, 0.65, 0.3, "tab1"), green=(0.5, -0.3, 0.65, 0.0, "tab2"))
 OBJECTIVE = parse_objective(["(held red)"])
@@ -162,8 +163,7 @@ def test_nested_too_deeply(tmp_path: Path) -> None:
 
 def test_a_full_disk_leaves_what_was_there(file: Path, result: PathResult) -> None:
     before = file.read_bytes()
-    file.with_name(".unfinished-plan.json").symlink_to("/dev/full")
-    with pytest.raises(InputError, match="cannot be written: No space left on device"):
+    with full_disk(), pytest.raises(InputError, match="cannot be written: File too large"):
         write_plan(file, SCENE, OBJECTIVE, result, {})
     assert file.read_bytes() == before
     assert [path.name for path in file.parent.iterdir()] == ["plan.json"]

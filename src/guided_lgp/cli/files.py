@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from guided_lgp.cli.outputs import destinations
 from guided_lgp.cli.terminal import is_plan
 from guided_lgp.documents import write_text
 from guided_lgp.errors import InputError
@@ -57,6 +58,8 @@ def export(
     from guided_lgp.bounds.plan_file import read_plan
     from guided_lgp.export import export_plan
 
+    if out.suffix:  # a bag is a folder, which is not replaced
+        out = destinations({"FILE": out}, [plan_file])["FILE"] or out
     export_plan(read_plan(plan_file), out, speed)
     typer.echo(f"written: {out}")
 

@@ -9,7 +9,9 @@ from typing import Annotated
 import typer
 
 from guided_lgp import __version__
+from guided_lgp.cli.outputs import destinations
 from guided_lgp.cli.terminal import AsJson, is_plan, one_of, show, spinner
+from guided_lgp.documents import STANDARD_OUTPUT
 from guided_lgp.errors import InputError
 from guided_lgp.paths import MODELS, PLANNING
 from guided_lgp.policy.registry import POLICIES
@@ -82,7 +84,8 @@ def plan(
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="Write the plan as JSON, with its joint motion in rad and s.",
+            help="Write the plan as JSON, with its joint motion in rad and s; - is standard "
+            "output.",
             show_default="no file",
         ),
     ] = None,
@@ -90,7 +93,7 @@ def plan(
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="Write a page that plays the motion in the browser.",
+            help="Write a page that plays the motion in the browser; - is standard output.",
             show_default="no file",
         ),
     ] = None,
@@ -134,9 +137,10 @@ def plan(
     from guided_lgp.planning import plan as search
     from guided_lgp.scene import load_scene
 
-    for file in filter(None, (out, html)):
-        if not file.parent.is_dir():
-            raise InputError(str(file), "its folder does not exist", "a file in an existing folder")
+    files = destinations({"--out": out, "--html": html}, [scene, params, models])
+    piped = STANDARD_OUTPUT in files.values()
+    if piped and as_json:
+        raise InputError("--json", "needs standard output, and so does a file named -")
     if is_plan(scene):
         raise InputError(
             str(scene), "is a plan, not a scene", "a scene; view and export take plans"
@@ -179,7 +183,8 @@ def plan(
     }
     path = result.path
     if path is not None and not path.skeleton:
-        typer.echo(json.dumps(summary, indent=1) if as_json else "the goals hold already")
+        text = json.dumps(summary, indent=1) if as_json else "the goals hold already"
+        typer.echo(text, err=piped)
         return
     if path is None or path.trajectory is None:
         if as_json:
@@ -197,17 +202,19 @@ def plan(
         with spinner("executing"):
             physics = asdict(simulate(start, objective, path.skeleton, path.trajectory))
         summary["physics"] = physics
-    if out:
+    if plan_file := files["--out"]:
         from guided_lgp.bounds.plan_file import write_plan
 
-        write_plan(out, start, objective, path, statistics, physics)
-    if html:
+        write_plan(plan_file, start, objective, path, statistics, physics)
+    if page := files["--html"]:
         from guided_lgp.view.replay import replay_html
 
         with spinner("writing the replay"):
-            replay_html(path.trajectory, start, html, path.skeleton, objective)
+            replay_html(path.trajectory, start, page, path.skeleton, objective)
     if as_json:
         typer.echo(json.dumps(summary, indent=1))
+        return
+    if piped:
         return
     show(["", "action"], [(str(k), str(a)) for k, a in enumerate(path.skeleton, 1)])
     typer.echo(f"motion of {path.trajectory.times[-1]:.1f} s, found in {sum(times.values()):.1f} s")

@@ -1,0 +1,67 @@
+"""Files that a command is to write: refused before the work begins, not after it."""
+
+import os
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+
+from guided_lgp.documents import STANDARD_OUTPUT, is_stream
+from guided_lgp.errors import InputError
+
+
+def destinations(
+    options: Mapping[str, Path | None], inputs: Sequence[Path]
+) -> dict[str, Path | None]:
+    """Where the files of a command go: symbolic links are followed.
+
+    Args:
+        options: the file that each option names, if it does.
+        inputs: files that the command reads, and folders of such files.
+
+    Raises:
+        InputError: a file cannot be written, is one of the inputs, or is named twice.
+    """
+    found: dict[str, Path | None] = {}
+    for option, file in options.items():
+        target = None if file is None else _destination(f"{option} {file}", file)
+        if target is not None:
+            _require_no_input(f"{option} {file}", target, inputs)
+            for other, taken in found.items():
+                if taken == target and not target.is_char_device():
+                    raise InputError(f"{option} {file}", f"is also the file of {other}")
+        found[option] = target
+    return found
+
+
+def _destination(where: str, file: Path) -> Path:
+    """The file itself, behind all links, which can be written."""
+    if file == STANDARD_OUTPUT:
+        return file
+    target = _followed(where, file)
+    if target.is_dir():
+        raise InputError(where, "is a folder, or no name at all", "a file")
+    if not target.parent.is_dir():
+        raise InputError(where, "its folder does not exist", "a file in an existing folder")
+    if not os.access(target if is_stream(target) else target.parent, os.W_OK):
+        raise InputError(where, "cannot be written: Permission denied")
+    return target
+
+
+def _followed(where: str, file: Path) -> Path:
+    try:
+        target = file.resolve()
+        with suppress(FileNotFoundError):
+            target.lstat()
+    except (OSError, RuntimeError, ValueError) as error:  # the last two: a loop of links, a NUL
+        fault = getattr(error, "strerror", None) or "is no name of a file"
+        raise InputError(where, f"cannot be written: {fault}") from None
+    return target
+
+
+def _require_no_input(where: str, target: Path, inputs: Sequence[Path]) -> None:
+    if target == STANDARD_OUTPUT or not target.is_file():
+        return
+    for file in inputs:
+        above = (target, *target.parents)
+        if file.exists() and any(place.samefile(file) for place in above):
+            raise InputError(where, f"is read by this command: {file}", "another file")

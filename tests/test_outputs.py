@@ -1,0 +1,68 @@
+"""Files that a command is to write are refused before it plans."""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from guided_lgp.cli.outputs import destinations
+from guided_lgp.errors import InputError
+
+
+def refused(out: Path, html: Path | None = None, *inputs: Path) -> str:
+    with pytest.raises(InputError) as caught:
+        destinations({"--out": out, "--html": html}, inputs)
+    return str(caught.value)
+
+
+def loop(folder: Path) -> Path:
+    (folder / "loop").symlink_to("loop")
+    return folder / "loop"
+
+
+@pytest.mark.parametrize(
+    ("file", "fault"),
+    [
+        (lambda folder: folder, "is a folder"),
+        (lambda folder: Path(), "is a folder, or no name"),
+        (lambda folder: folder / ("x" * 300), "File name too long"),
+        (lambda folder: folder / "none" / "plan.json", "folder does not exist"),
+        (lambda folder: folder / "scene.json" / "plan.json", "Not a directory"),
+        (lambda folder: folder / "a\0b", "is no name of a file"),
+        (lambda folder: Path("/proc/plan.json"), "Permission denied"),
+        (loop, "cannot be written"),
+    ],
+)
+def test_what_cannot_be_written(file: Callable[[Path], Path], fault: str, tmp_path: Path) -> None:
+    (tmp_path / "scene.json").touch()
+    if fault == "Permission denied" and os.access("/proc", os.W_OK):
+        pytest.skip("this user may write anywhere")
+    message = refused(file(tmp_path))
+    assert message.startswith("--out ")
+    assert fault in message
+
+
+def test_inputs_and_the_other_file_are_not_overwritten(tmp_path: Path) -> None:
+    scene, models = tmp_path / "scene.json", tmp_path / "models"
+    models.mkdir()
+    weights = models / "weights.json"
+    link, other = tmp_path / "link", tmp_path / "other"
+    link.symlink_to(scene)
+    for file in (scene, weights):
+        file.touch()
+    other.hardlink_to(scene)
+    for file in (scene, link, other, weights):
+        assert "is read by this command" in refused(file, None, scene, models)
+    assert "is also the file of --out" in refused(tmp_path / "x", models / ".." / "x")
+    assert "is also the file of --out" in refused(Path("-"), Path("-"))
+
+
+def test_links_are_followed_and_streams_are_accepted(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "link").symlink_to("new")
+    accepted = destinations({"--out": tmp_path / "link", "--html": tmp_path / "pipe"}, [tmp_path])
+    assert accepted == {"--out": tmp_path / "new", "--html": tmp_path / "pipe"}
+    null = Path("/dev/null")
+    assert destinations({"--out": null, "--html": null}, []) == {"--out": null, "--html": null}
+    assert destinations({"--out": None, "--html": Path("-")}, [])["--html"] == Path("-")
