@@ -13,7 +13,7 @@ import pytest
 import yaml
 from typer.main import get_command
 
-from guided_lgp import __version__, cli, doctor
+from guided_lgp import __version__, cache, cli, doctor
 from guided_lgp.errors import InputError, WorkerError
 
 ROOT = Path(__file__).parents[1]
@@ -153,6 +153,21 @@ def test_output_in_a_missing_folder(capsys: pytest.CaptureFixture[str]) -> None:
     assert "folder does not exist" in rejected(capsys, *PLAN, "--out", "nowhere/plan.json")
 
 
+def test_output_over_the_scene_is_refused_before_planning(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = edited(tmp_path)
+    before = file.read_bytes()
+    words = ["plan", str(file), "--goal", "(on red green)"]
+    assert "is read by this command" in rejected(capsys, *words, "--out", str(file))
+    assert "is also the file of --out" in rejected(
+        capsys, *words, "--out", str(tmp_path / "x"), "--html", str(tmp_path / "x")
+    )
+    assert "--out .: is a folder, or no name" in rejected(capsys, *words, "--out", "")
+    assert "standard output" in rejected(capsys, *words, "--out", "-", "--json")
+    assert file.read_bytes() == before
+
+
 def test_a_scene_that_is_not_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "scene.json"
     file.write_text("{")
@@ -265,6 +280,12 @@ def test_plan_writes_actions_and_a_replay(
     assert {"tree_size", "attempts", "time_s"} <= set(plan["statistics"])
 
 
+def test_a_plan_goes_to_standard_output_alone() -> None:
+    done = call(*PLAN, "--out", "-")
+    assert done.returncode == 0
+    assert json.loads(done.stdout)["objective"] == ["(on red green)"]
+
+
 def test_no_plan_ends_with_1_and_says_why(capsys: pytest.CaptureFixture[str]) -> None:
     scene = str(ROOT / "examples" / "impossible_tower.json")
     limits = ["--planner", "breadth-first", "--max-nodes", "100", "--json"]
@@ -313,6 +334,24 @@ def test_doctor_says_how_to_mend(capsys: pytest.CaptureFixture[str]) -> None:
     assert findings["Cache"]["ok"]
     assert findings["Policy paper"]["ok"]
     assert all(finding["ok"] or finding["mend"] for finding in findings.values())
+
+
+def test_doctor_finds_a_damaged_cache_and_mends_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    file = cache.made("entry", lambda _: b"content")
+    assert file is not None
+    assert doctor._cache().ok
+    file.write_bytes(b"other")
+    finding = doctor._cache()
+    assert not finding.ok
+    assert str(file) in finding.detail
+    assert finding.mend.endswith("doctor --repair")
+    assert len(doctor.repair()) == 1
+    assert doctor._cache().ok
+    assert not list(file.parent.iterdir())
+    assert doctor.repair() == []
 
 
 def test_doctor_finds_damaged_models_and_a_cache_that_cannot_be_written(

@@ -16,6 +16,8 @@ from guided_lgp.paths import DESCRIPTIONS, MODELS, SOURCES
 from guided_lgp.policy.registry import POLICIES, load_policy
 
 _INSTALL = f"make -C {SOURCES} setup"
+_OWN_CACHE = "set XDG_CACHE_HOME to a folder of your own that can be written"
+_REPAIR = "guided-lgp doctor --repair"
 
 
 @dataclass(frozen=True)
@@ -77,18 +79,31 @@ def _compiler() -> Finding:
 
 
 def _cache() -> Finding:
-    try:
-        from guided_lgp.cache import cache_folder
+    from guided_lgp.cache import damaged, private_folder
 
-        folder = cache_folder()
-        folder.mkdir(parents=True, exist_ok=True)
+    try:
+        folder = private_folder()
         with TemporaryFile(dir=folder):
-            return Finding("Cache", True, f"{folder} for compiled solvers")
-    except ImportError as error:
-        return Finding("Cache", False, str(error), _INSTALL)
-    except OSError as error:
-        fault = f"{folder} for compiled solvers: {error.strerror}"
-        return Finding("Cache", False, fault, "set XDG_CACHE_HOME to a folder that can be written")
+            bad = damaged()
+    except (InputError, OSError) as error:
+        return Finding("Cache", False, str(error), _OWN_CACHE)
+    if bad:
+        return Finding("Cache", False, f"damaged: {' '.join(map(str, bad))}", _REPAIR)
+    return Finding("Cache", True, f"{folder} for compiled solvers")
+
+
+def repair() -> list[str]:
+    """Mend what can be mended without the network: empty a damaged cache, which is made again.
+
+    Returns:
+        What was mended, one line each.
+    """
+    from guided_lgp.cache import clear
+
+    if _cache().mend != _REPAIR:
+        return []
+    clear()
+    return ["the cache was emptied; the next plan fills it again"]
 
 
 def _policy(name: str) -> Finding:

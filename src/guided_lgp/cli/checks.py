@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import asdict
+from typing import Annotated
 
 import typer
 
@@ -11,13 +12,20 @@ app = typer.Typer()
 
 
 @app.command()
-def doctor(as_json: AsJson = False) -> None:
+def doctor(
+    as_json: AsJson = False,
+    mend: Annotated[
+        bool, typer.Option("--repair", help="Mend a damaged cache.", show_default="check only")
+    ] = False,
+) -> None:
     """Check the installation and say how to mend what is missing.
 
-    Example: guided-lgp doctor
+    Example: guided-lgp doctor --repair
     """
-    from guided_lgp.doctor import examine
+    from guided_lgp.doctor import examine, repair
 
+    for line in repair() if mend else ():
+        typer.echo(f"mended: {line}", err=True)
     findings = examine()
     if as_json:
         typer.echo(json.dumps([asdict(finding) for finding in findings], indent=1))
