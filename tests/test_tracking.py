@@ -14,6 +14,7 @@ import pandas as pd
 import pytest
 
 from guided_lgp import tracking
+from guided_lgp.domains import load_domain
 from guided_lgp.errors import InputError
 from guided_lgp.mlflow_model import log_model
 from guided_lgp.params import Params, load_params
@@ -21,6 +22,7 @@ from guided_lgp.policy.paper.encoding import Encoding
 from guided_lgp.policy.paper.model import Model
 from guided_lgp.policy.relational import model as relational
 from guided_lgp.policy.relational.encoding import Range
+from guided_lgp.policy.relational.heads import heads
 from guided_lgp.policy.relational.model import Weights, shapes
 
 ROOT = Path(__file__).parents[1]
@@ -234,7 +236,10 @@ def test_networks_can_be_loaded_from_mlflow(tmp_path: Path, experiment: str) -> 
 
 def test_the_relational_policy_can_be_loaded_from_mlflow(tmp_path: Path, experiment: str) -> None:
     rng = np.random.default_rng(0)
-    tensors = {n: rng.normal(size=s).astype(np.float32) for n, s in shapes(4, 1).items()}
+    tensors = {
+        n: rng.normal(size=s).astype(np.float32)
+        for n, s in shapes(4, 1, heads(load_domain())).items()
+    }
     weights = Weights(Range(lower=(0.0,) * 3, upper=(1.0,) * 3), tensors)
     relational.Model(weights, training={}).save(tmp_path / "models")
     model = logged_and_loaded(tmp_path / "models", "relational", experiment)

@@ -165,8 +165,6 @@ class SearchLimits(Section):
     max_sequences: Annotated[int, Field(strict=True, ge=1, le=1_000_000)]
     """Sequences handed to the coarse bound: minutes at 20 actions, where a search could otherwise
     take a day."""
-    max_seconds: Annotated[float | None, Field(gt=0)] = None
-    """Wall clock, for users; experiments have none, so that their results are the same anywhere."""
 
 
 class PlanningParams(Section):

@@ -128,13 +128,13 @@ def plan(
         return _without_search(PathResult((), feasible=True))
     validate_objective(goals, scene.symbols, scene.state)
     params = params or load_planning()
-    limits = _limits(params.compare_scalability, scene, goals, max_nodes, timeout)
+    limits = _limits(params.compare_scalability, scene, goals, max_nodes)
     scene_bounds = SceneBounds(scene, params.bounds)
     if fact := out_of_reach(scene, scene_bounds.facts, goals):
         return _without_search(None, fact)
     bounds = ObservedBounds(scene_bounds)
     search, followed = _guidance(planner, policy, models, scene)
-    result = search.plan(Problem(scene, goals, limits, bounds, followed))
+    result = search.plan(Problem(scene, goals, limits, bounds, followed, max_seconds=timeout))
     return PlanningResult(
         **vars(result),
         solver_starts=bounds.starts,
@@ -167,7 +167,6 @@ def _limits(
     scene: Scene,
     goals: Objective,
     max_nodes: int | None,
-    timeout: float | None,
 ) -> SearchLimits:
     """Limits that follow the task: those of the experiments, or more where it needs more."""
     lower_bound = least_actions(scene.state, goals, scene.symbols)
@@ -176,7 +175,6 @@ def _limits(
         "max_depth": max(limits.max_depth, 2 * least),
         "max_sequences": limits.max_sequences + SEQUENCES_PER_ACTION * least,
         "max_tree_size": max_nodes or limits.max_tree_size,
-        "max_seconds": timeout,
     }
     return limits.model_copy(update=changed)
 

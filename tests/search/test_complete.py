@@ -42,7 +42,6 @@ def test_what_is_infeasible_is_exhausted(scene: Scene, limits: SearchLimits) -> 
 
 
 def test_the_limit_of_time_ends_it(scene: Scene, limits: SearchLimits) -> None:
-    limits = limits.model_copy(update={"max_seconds": 1e-9})
     bounds = ScriptedBounds(scene)
-    result = complete.plan(Problem(scene, OBJECTIVE, limits, bounds, CIRCLES))
+    result = complete.plan(Problem(scene, OBJECTIVE, limits, bounds, CIRCLES, max_seconds=1e-9))
     assert (result.reason, bounds.coarse_asked) == ("max_seconds", [])

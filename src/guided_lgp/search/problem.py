@@ -28,6 +28,9 @@ class Problem:
     restriction: Symbols | None = None
     """The symbols that actions may name, if not all of the scene."""
 
+    max_seconds: float | None = None
+    """Wall clock, for users; experiments have none, so that their results are the same anywhere."""
+
     def __post_init__(self) -> None:
         validate_objective(self.objective, self.symbols, self.scene.state)
 

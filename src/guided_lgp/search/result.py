@@ -100,6 +100,7 @@ class Run:
         self._bounds = problem.bounds
         self._policy = problem.policy
         self._limits = problem.limits
+        self._allowed_s = problem.max_seconds
         self._start = time.perf_counter()
         self._waited = 0.0
         self._policy_s = self._coarse_s = self._path_s = 0.0
@@ -172,7 +173,7 @@ class Run:
     @property
     def expired(self) -> bool:
         """Whether the time is up."""
-        allowed = self._limits.max_seconds
+        allowed = self._allowed_s
         return allowed is not None and time.perf_counter() - self._start >= allowed
 
     def limit_reached(self, tree_size: int) -> Limit | None:
