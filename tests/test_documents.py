@@ -14,8 +14,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from guided_lgp import documents
-from guided_lgp.documents import read_json, write_json, write_text, written_whole
-from guided_lgp.errors import InputError
+from guided_lgp.documents import read_json, read_yaml, write_json, write_text, written_whole
+from guided_lgp.errors import InputError, shortened
 
 CONTENT = np.random.default_rng(1).bytes(2**20)
 WRITERS: dict[str, Callable[[Path], object]] = {
@@ -49,7 +49,12 @@ def test_a_document(tmp_path: Path) -> None:
         (b"[1, -Infinity]", "is not JSON: -Infinity is not a finite number"),
         (b"[1e999]", "is not JSON: 1e999 is not a finite number"),
         (b"[%s.0]" % (b"9" * 5000), "is not JSON: 99999999999999999999 is not a finite number"),
-        (b"[%s]" % (b"9" * 5000), "is not JSON: Exceeds the limit"),
+        (b"[%s]" % (b"9" * 5000), "is not JSON: 99999999999999999999 is not a finite number"),
+        (b"[1%s]" % (b"0" * 400), "is not JSON: 10000000000000000000 is not a finite number"),
+        (b'{"a": 1, "b": 2, "a": 3}', "is not JSON: has the key 'a' twice"),
+        (b'[{"a": {"%s": 1, "%s": 2}}]' % (b"k" * 999, b"k" * 999), "is not JSON: has the key"),
+        (b'["\\ud800"]', "is not JSON: has a lone surrogate U+D800"),
+        (b'{"\\uDFFF": 1}', "is not JSON: has a lone surrogate U+DFFF"),
     ],
 )
 def test_faults(content: bytes, fault: str, tmp_path: Path) -> None:
@@ -61,6 +66,45 @@ def test_faults(content: bytes, fault: str, tmp_path: Path) -> None:
     assert message.startswith(f"{file}: {fault}")
     assert message.endswith(" (accepted: the output of stage x)")
     assert len(message) < len(str(file)) + 300
+
+
+@pytest.mark.parametrize(
+    ("content", "fault"),
+    [
+        ("a: 1\nb: 2\na: 3", "has the key 'a' twice"),
+        ("a: {b: 1, b: 2}", "has the key 'b' twice"),
+        ("a: 1" + "0" * 400, "10000000000000000000 is not a finite number"),
+        ("a: 1" + "0" * 5000, "Exceeds the limit"),
+        ('a: "\\ud800"', "has a lone surrogate U+D800"),
+        ("a: [", "expected the node content"),
+        ("a: 2024-13-45", "month must be in 1..12"),
+        ("[" * 5000, "is nested too deeply"),
+    ],
+)
+def test_faults_in_yaml(content: str, fault: str, tmp_path: Path) -> None:
+    file = tmp_path / "file.yaml"
+    file.write_text(content)
+    with pytest.raises(InputError) as caught:
+        read_yaml(file)
+    assert fault in str(caught.value)
+    assert len(str(caught.value)) < len(str(file)) + 310
+
+
+def test_yaml(tmp_path: Path) -> None:
+    file = tmp_path / "file.yaml"
+    file.write_text("a: &a {x: 1, y: 2}\nb: {<<: *a, x: 3}\nc: 2020-01-01")
+    document = read_yaml(file)
+    assert document["b"] == {"x": 3, "y": 2}
+    file.write_text("x" * 10)
+    assert read_yaml(file) == "x" * 10
+
+
+def test_a_long_line_keeps_its_ends() -> None:
+    line = shortened("begin" + "x" * 10**6 + "end")
+    assert len(line) == 300
+    assert line.startswith("beginx")
+    assert line.endswith("xend")
+    assert len(str(InputError("file", "\0" * 10**6))) < 1500
 
 
 def test_missing_and_unreadable_files(tmp_path: Path) -> None:
@@ -83,7 +127,7 @@ def test_no_number_is_lost(tmp_path: Path) -> None:
 
 def test_what_is_written_is_read(tmp_path: Path) -> None:
     file = tmp_path / "deep" / "file.json"
-    document = {"röd": [math.pi, -0.0, 2**60, None, "\ud800"]}
+    document = {"röd": [math.pi, -0.0, 2**60, None, "\U0001f600"]}
     write_json(file, document)
     assert read_json(file) == document
     before = file.read_bytes()

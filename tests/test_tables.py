@@ -8,7 +8,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from guided_lgp.errors import InputError
-from guided_lgp.tables import read_table, write_table
+from guided_lgp.tables import read_columns, read_table, write_table
 
 TABLE = pa.table({"name": ["a", "b"], "value": [1, 2]})
 
@@ -53,3 +53,13 @@ def test_damaged_bytes(tmp_path: Path) -> None:
         with suppress(InputError):
             rows = read_table(path, "some_stage", TABLE.column_names)
         assert rows in (None, TABLE.to_pylist()) or place >= footer
+
+
+@pytest.mark.parametrize("values", [["1", "2"], [b"1", b"2"], [[1], [2]], [True, True]])
+def test_other_types_are_refused_and_not_converted(values: list[object], tmp_path: Path) -> None:
+    path = tmp_path / "table.parquet"
+    write_table(path, TABLE)
+    assert read_columns(path, "some_stage", TABLE.schema).equals(TABLE)
+    write_table(path, pa.table({"name": ["a", "b"], "value": values}))
+    with pytest.raises(InputError, match=r"in the column 'value', not int64 .*stage some_stage"):
+        read_columns(path, "some_stage", TABLE.schema)

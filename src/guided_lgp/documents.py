@@ -4,22 +4,26 @@ import fcntl
 import json
 import math
 import os
+import re
 import secrets
 import stat
 import sys
 import time
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from glob import escape
 from pathlib import Path
 from typing import Any
 
+import yaml
 from pydantic import ValidationError
 
 from guided_lgp.errors import InputError
 
 LARGEST = 2**31
 """Bytes that a document may have: twice those of the scenes of a million configurations."""
+_SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
 STANDARD_OUTPUT = Path("-")
 _UNFINISHED = ".unfinished-"
 _LONGEST_END = 50
@@ -48,7 +52,14 @@ def read_json(path: Path, accepted: str = "") -> Any:
         raise InputError(where, f"is larger than {LARGEST // 2**20} MiB", accepted)
     try:
         text = content.decode("utf-8")
-        return json.loads(text, parse_float=_finite, parse_constant=_finite)
+        document = json.loads(
+            text,
+            parse_float=_finite,
+            parse_int=_whole,
+            parse_constant=_finite,
+            object_pairs_hook=_without_duplicates,
+        )
+        return _in_unicode(document) if _SURROGATE.search(text) else document
     except UnicodeDecodeError as error:
         raise InputError(where, f"is not UTF-8 at byte {error.start}", accepted) from None
     except RecursionError:
@@ -62,6 +73,91 @@ def _finite(text: str) -> float:
     if not math.isfinite(value):
         raise ValueError(f"{text[:20]} is not a finite number")
     return value
+
+
+def _whole(text: str) -> int:
+    _finite(text)  # neither NumPy nor most of the models take an integer beyond a float
+    return int(text)
+
+
+def _without_duplicates(pairs: Iterable[tuple[Any, Any]]) -> dict[Any, Any]:
+    """A mapping of pairs, each key once.
+
+    Raises:
+        ValueError: a key comes twice: which value counts, only its reader would know.
+    """
+    found: dict[Any, Any] = {}
+    for key, value in pairs:
+        if key in found:
+            raise ValueError(f"has the key {key!r:.40} twice")
+        found[key] = value
+    return found
+
+
+def _in_unicode(document: Any) -> Any:
+    """The document, whose strings can be written again: no half of a pair of surrogates."""
+    try:
+        json.dumps(document, ensure_ascii=False).encode("utf-8")
+    except UnicodeEncodeError as error:
+        raise _lone(error) from None
+    return document
+
+
+def _lone(error: UnicodeEncodeError) -> ValueError:
+    code = ord(error.object[error.start])
+    return ValueError(f"has a lone surrogate U+{code:04X} in a string")
+
+
+def read_yaml(path: Path, accepted: str = "") -> Any:
+    """Read a YAML document as strictly as :func:`read_json`.
+
+    Args:
+        path: the file.
+        accepted: what such a file holds, for the message.
+
+    Raises:
+        InputError: the file is missing, not YAML, or has a key twice.
+    """
+    where = str(path)
+    try:
+        return yaml.load(path.read_text(encoding="utf-8"), _Loader)
+    except OSError as error:
+        raise InputError(where, error.strerror or "cannot be read", accepted) from None
+    except RecursionError:
+        raise InputError(where, "is nested too deeply", accepted) from None
+    except (yaml.YAMLError, ValueError, LookupError, AttributeError) as error:
+        # PyYAML raises the last three for values that do not fit their tag, such as 2024-13-45.
+        raise InputError(where, f"is not YAML: {' '.join(str(error).split())}", accepted) from None
+
+
+class _Loader(yaml.SafeLoader):
+    """PyYAML's, which takes the last of several values of a key, and any number and string."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        scalars = (key for key, _ in node.value if isinstance(key, yaml.ScalarNode))
+        count = Counter((key.tag, key.value) for key in scalars)
+        for (_, key), times in count.items():
+            if times > 1:
+                raise ValueError(f"has the key {key!r:.40} twice")
+        return dict(super().construct_mapping(node, deep))
+
+    def construct_yaml_int(self, node: yaml.ScalarNode) -> int:
+        value = int(super().construct_yaml_int(node))
+        if abs(value) > sys.float_info.max:
+            raise ValueError(f"{node.value[:20]} is not a finite number")
+        return value
+
+    def construct_yaml_str(self, node: yaml.ScalarNode) -> str:
+        value = str(super().construct_yaml_str(node))
+        try:
+            value.encode("utf-8")
+        except UnicodeEncodeError as error:
+            raise _lone(error) from None
+        return value
+
+
+_Loader.add_constructor("tag:yaml.org,2002:int", _Loader.construct_yaml_int)
+_Loader.add_constructor("tag:yaml.org,2002:str", _Loader.construct_yaml_str)
 
 
 def first_fault(error: ValidationError, where: str) -> InputError:

@@ -1,5 +1,19 @@
 """Errors that a user can mend."""
 
+LONGEST = 300
+"""Characters of a line that says what is wrong."""
+
+
+def shortened(text: str) -> str:
+    """The text, or its beginning and its end, which name the place and what is accepted."""
+    begin, end = LONGEST * 2 // 3, LONGEST // 3 - len(" … ")
+    return text if len(text) <= LONGEST else f"{text[:begin]} … {text[-end:]}"
+
+
+def printable(text: str) -> str:
+    """The text with escapes for the characters that do not print."""
+    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
+
 
 class InputError(ValueError):
     """Bad input: one line that names the file, the field, the fault and what is accepted.
@@ -13,8 +27,9 @@ class InputError(ValueError):
 
     def __str__(self) -> str:
         where, fault, accepted = self.args
+        fault = shortened(fault)
         text = f"{where}: {fault} (accepted: {accepted})" if accepted else f"{where}: {fault}"
-        return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
+        return printable(text)
 
 
 class WorkerError(RuntimeError):

@@ -4,10 +4,10 @@ import reprlib
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin
 
-import yaml
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 from pydantic_core import PydanticCustomError
 
+from guided_lgp.documents import read_yaml
 from guided_lgp.errors import InputError
 from guided_lgp.paths import PARAMS, PLANNING
 
@@ -198,7 +198,7 @@ def load_planning(path: Path = PLANNING) -> PlanningParams:
     Raises:
         InputError: see :func:`read_params`.
     """
-    document = _read(path)
+    document = read_yaml(path)
     whole = isinstance(document, dict) and not document.keys() <= PlanningParams.model_fields.keys()
     return _validated(path, document, Params if whole else PlanningParams)
 
@@ -214,19 +214,7 @@ def read_params(path: Path, model: type[Parameters]) -> Parameters:
         InputError: the file is missing, is not YAML, has an unknown key, a wrong type or an
             impossible value; the message names the key and what is accepted.
     """
-    return _validated(path, _read(path), model)
-
-
-def _read(path: Path) -> Any:
-    try:
-        return yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(str(path), error.strerror or "cannot be read") from None
-    except RecursionError:
-        raise InputError(str(path), "is nested too deeply") from None
-    except (yaml.YAMLError, ValueError, LookupError, AttributeError) as error:
-        # PyYAML raises the last three for values that do not fit their tag, such as 2024-13-45.
-        raise InputError(str(path), f"is not YAML: {' '.join(str(error).split())}") from None
+    return _validated(path, read_yaml(path), model)
 
 
 def _validated(path: Path, document: Any, model: type[Parameters]) -> Parameters:

@@ -49,9 +49,25 @@ def read_columns(path: Path, stage: str, columns: pa.Schema) -> pa.Table:
         InputError: the file is missing, damaged or of another version, or has other types.
     """
     with _readable(path, stage) as parquet:
-        table = parquet(columns.names).cast(columns)
+        table = parquet(columns.names)
+        for column in columns:
+            found = table.schema.field(column.name).type
+            if not pa.types.is_null(found) and _kind(found) != _kind(column.type):
+                fault = f"has {found} in the column {column.name!r}, not {column.type}"
+                raise InputError(str(path), fault, f"the output of stage {stage}")
+        table = table.cast(columns)
         table.validate(full=True)  # strings that are no UTF-8, for instance
     return table
+
+
+def _kind(column: pa.DataType) -> str:
+    """What a column holds, whatever its width; Arrow would convert one kind to another."""
+    kinds = {
+        "text": pa.types.is_string(column) or pa.types.is_large_string(column),
+        "numbers": pa.types.is_integer(column) or pa.types.is_floating(column),
+        "lists": pa.types.is_list(column) or pa.types.is_large_list(column),
+    }
+    return next((kind for kind, holds in kinds.items() if holds), str(column))
 
 
 @contextmanager

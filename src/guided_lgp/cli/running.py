@@ -9,7 +9,7 @@ from typing import NoReturn
 import typer
 from typer.exceptions import TyperException
 
-from guided_lgp.errors import InputError, WorkerError
+from guided_lgp.errors import InputError, WorkerError, printable, shortened
 
 
 def run_program(program: Callable[[list[str]], int | None], arguments: Sequence[str]) -> NoReturn:
@@ -68,5 +68,5 @@ def _fail(error: Exception, code: int, debug: bool) -> NoReturn:
     text = error.format_message() if isinstance(error, TyperException) else str(error)
     if code == 3 and not isinstance(error, WorkerError):
         text = f"internal error: {type(error).__name__}: {text}; --debug shows where"
-    typer.echo(f"error: {' '.join(text.split())}", err=True)
+    typer.echo(shortened(f"error: {printable(' '.join(text.split()))}"), err=True)
     sys.exit(code)
