@@ -4,8 +4,10 @@ import json
 import logging
 import os
 import shutil
+import socket
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +26,7 @@ from guided_lgp.policy.relational import model as relational
 from guided_lgp.policy.relational.encoding import Range
 from guided_lgp.policy.relational.heads import heads
 from guided_lgp.policy.relational.model import Weights, shapes
+from guided_lgp.tracking import runs as runs_module
 
 ROOT = Path(__file__).parents[1]
 PARAMS = load_params(ROOT / "params.yaml")
@@ -291,6 +294,64 @@ def test_tracking_problems_are_warnings(
     with caplog.at_level(logging.WARNING, logger="guided_lgp"):
         record()
     assert "MLflow: not recorded" in caplog.text
+
+
+def warnings(caplog: pytest.LogCaptureFixture, captured: str) -> list[str]:
+    """All lines that tracking has written."""
+    return [record.getMessage() for record in caplog.records] + captured.splitlines()
+
+
+def test_a_server_that_does_not_answer_delays_no_stage(
+    clone: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr(runs_module, "LONGEST_S", 1.0)
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        address = f"http://127.0.0.1:{silent.getsockname()[1]}"
+        monkeypatch.setenv("MLFLOW_TRACKING_URI", address)
+        start = time.monotonic()
+        record()
+        assert time.monotonic() - start < 3
+    assert warnings(caplog, capfd.readouterr().err) == ["MLflow: not recorded: no answer in 1 s"]
+
+
+def test_a_server_that_is_not_there_is_given_up_within_seconds(
+    clone: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setenv("MLFLOW_TRACKING_URI", "http://127.0.0.1:9")
+    start = time.monotonic()
+    record()
+    assert time.monotonic() - start < 20
+    (line,) = warnings(caplog, "")
+    assert line.startswith("MLflow: not recorded: ")
+    assert len(line) <= 300
+
+
+def test_a_database_that_goes_during_a_stage_is_one_line(
+    clone: Path, caplog: pytest.LogCaptureFixture, capfd: pytest.CaptureFixture[str]
+) -> None:
+    capfd.readouterr()
+    with tracking.recorded("generate_scenes", PARAMS):
+        (clone / "mlflow.db").unlink()
+    (line,) = warnings(caplog, capfd.readouterr().err)
+    assert line.startswith("MLflow: not recorded: ")
+    assert len(line) <= 300
+
+
+def test_of_two_that_make_the_database_both_are_recorded(clone: Path) -> None:
+    (clone / "mlflow.db").unlink()
+    code = """
+from pathlib import Path
+from guided_lgp import tracking
+from guided_lgp.params import load_params
+with tracking.recorded("generate_scenes", load_params(Path("params.yaml"))):
+    pass
+"""
+    both = [subprocess.Popen([sys.executable, "-c", code]) for _ in range(2)]
+    assert [process.wait(120) for process in both] == [0, 0]
+    assert [run.info.status for run in children()] == ["FINISHED"] * 2
 
 
 def test_sync_records_once(clone: Path) -> None:

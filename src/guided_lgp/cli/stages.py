@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+from guided_lgp.cli.alone import alone
 from guided_lgp.cli.terminal import ParamsFile
 from guided_lgp.paths import PARAMS
 
@@ -128,14 +129,15 @@ def render_reports(params: ParamsFile = PARAMS) -> None:
 
 
 def _run_stage(stage: str, params_file: Path, *arguments: str) -> None:
-    """Check all parameters, then run a stage and record it."""
+    """Check all parameters, then run a stage, once at a time in a clone, and record it."""
     from guided_lgp import tracking
     from guided_lgp.params import load_params
 
     end_with_dvc()
     params = load_params(params_file)
     module = import_module(STAGES[stage])
-    with tracking.recorded("@".join([stage, *arguments]), params):
+    address = "@".join([stage, *arguments])
+    with alone(Path.cwd(), address), tracking.recorded(address, params):
         module.run(params, Path.cwd(), *arguments)
 
 

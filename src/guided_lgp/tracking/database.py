@@ -4,6 +4,7 @@ import logging
 import os
 import platform
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -15,6 +16,8 @@ KEY_TAG = "guided_lgp.key"
 EXECUTION_TAG = "guided_lgp.execution"
 STATE_TAG = "guided_lgp.state"
 PROCESS_TAG = "guided_lgp.process"
+_HTTP = {"TIMEOUT": "5", "MAX_RETRIES": "1", "BACKOFF_FACTOR": "1"}
+"""For a server that cannot be reached: seconds, where MLflow would try for minutes."""
 
 
 def repository() -> Path:
@@ -41,10 +44,12 @@ def prepare() -> Any:
     """
     os.environ.setdefault("MLFLOW_ENABLE_ARTIFACTS_PROGRESS_BAR", "false")
     os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
+    for name, value in _HTTP.items():
+        os.environ.setdefault(f"MLFLOW_HTTP_REQUEST_{name}", value)
     import mlflow
 
-    for noisy in ("alembic", "mlflow"):
-        logging.getLogger(noisy).setLevel(logging.ERROR)
+    for noisy in ("alembic", "mlflow", "urllib3"):
+        logging.getLogger(noisy).setLevel(logging.CRITICAL)  # errors are ours to say, in one line
     uri = tracking_uri()
     local = uri.startswith(SQLITE)
     if local:
@@ -55,7 +60,11 @@ def prepare() -> Any:
         folder = Path(uri.removeprefix(SQLITE)).resolve().parent / "mlruns"
         # the kind makes the dashboard open on runs and charts, not on language models
         tags = {"mlflow.experimentKind": "custom_model_development"}
-        client.create_experiment(EXPERIMENT, folder.as_uri() if local else None, tags)
+        try:
+            client.create_experiment(EXPERIMENT, folder.as_uri() if local else None, tags)
+        except mlflow.MlflowException:  # of another process that was faster
+            if client.get_experiment_by_name(EXPERIMENT) is None:
+                raise
     _end_killed(client)
     return client
 
@@ -69,7 +78,8 @@ def _make_database(file: Path) -> None:
     with TemporaryDirectory(dir=file.parent, prefix=".unfinished-") as folder:
         made = Path(folder) / file.name
         mlflow.MlflowClient(f"{SQLITE}{made}").search_experiments(max_results=1)
-        made.replace(file)
+        with suppress(FileExistsError):  # another's, in which it may have recorded already
+            file.hardlink_to(made)
 
 
 def process() -> str:

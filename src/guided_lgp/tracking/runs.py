@@ -4,6 +4,7 @@ import logging
 import os
 import shutil
 import subprocess
+import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -12,7 +13,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
 
-from guided_lgp.errors import InputError
+from guided_lgp.errors import InputError, shortened
 from guided_lgp.params import Params
 from guided_lgp.tracking.database import (
     EXECUTION_TAG,
@@ -38,6 +39,10 @@ Value = TypeVar("Value")
 
 BATCH = 500
 """Metrics per request; MLflow accepts at most 1000."""
+
+LONGEST_S = 120.0
+"""How long recording may hold a stage at its start and at its end: on a busy machine the import of
+MLflow alone takes a quarter of it."""
 
 logger = logging.getLogger(__name__)
 
@@ -236,9 +241,20 @@ def _commit() -> str:
 
 
 def _attempt(action: Callable[[], Value]) -> Value | None:
-    try:
-        return action()
-    except Exception as error:
-        reason = " ".join(str(error).split())
-        logger.warning("MLflow: not recorded: %s: %s", type(error).__name__, reason)
-        return None
+    """What an action returns; None and one line if it fails or takes too long."""
+    results: list[Value] = []
+    faults: list[str] = [f"no answer in {LONGEST_S:g} s"]
+
+    def act() -> None:
+        try:
+            results.append(action())
+        except Exception as error:
+            faults[:] = [f"{type(error).__name__}: {' '.join(str(error).split())}"]
+
+    thread = threading.Thread(target=act, daemon=True)  # which ends with the process
+    thread.start()
+    thread.join(LONGEST_S)
+    if results:
+        return results[0]
+    logger.warning("%s", shortened(f"MLflow: not recorded: {faults[0]}"))
+    return None
