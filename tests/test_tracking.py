@@ -243,7 +243,7 @@ def test_the_relational_policy_can_be_loaded_from_mlflow(tmp_path: Path, experim
         n: rng.normal(size=s).astype(np.float32)
         for n, s in shapes(4, 1, heads(load_domain())).items()
     }
-    weights = Weights(Range(lower=(0.0,) * 3, upper=(1.0,) * 3), tensors)
+    weights = Weights(Range(lower=(0.0,) * 3, upper=(1.0,) * 3), tensors, load_domain())
     relational.Model(weights, training={}).save(tmp_path / "models")
     model = logged_and_loaded(tmp_path / "models", "relational", experiment)
     scene = (ROOT / "examples" / "four_boxes_and_tray.json").read_text()
