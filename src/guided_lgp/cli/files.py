@@ -58,9 +58,10 @@ def export(
     from guided_lgp.bounds.plan_file import read_plan
     from guided_lgp.export import export_plan
 
+    target = out
     if out.suffix:  # a bag is a folder, which is not replaced
-        out = destinations({"FILE": out}, [plan_file])["FILE"] or out
-    export_plan(read_plan(plan_file), out, speed)
+        target = destinations({"FILE": out}, [plan_file])["FILE"] or out
+    export_plan(read_plan(plan_file), target, speed)
     typer.echo(f"written: {out}")
 
 
