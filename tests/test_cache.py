@@ -72,6 +72,15 @@ def test_a_damaged_library_is_made_again_with_one_line(
     assert cache.is_whole(file)
 
 
+def test_a_generous_umask_does_not_spoil_the_cache(folder: Path) -> None:
+    before = os.umask(0)
+    try:
+        assert seven() == 7
+    finally:
+        os.umask(before)
+    assert cache.is_whole(library(folder))
+
+
 def test_links_are_not_followed(folder: Path, tmp_path: Path) -> None:
     assert seven() == 7
     victim = tmp_path / "victim"

@@ -246,6 +246,9 @@ def test_a_planted_link_is_replaced_and_a_mode_is_kept(tmp_path: Path) -> None:
     secret.touch(mode=0o600)
     write_json(secret, {})
     assert secret.stat().st_mode & 0o777 == 0o600
+    secret.chmod(0o444)  # as files that DVC protects
+    write_json(secret, {})
+    assert secret.stat().st_mode & 0o777 == 0o644
 
 
 def test_a_name_as_long_as_the_file_system_takes(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from contextlib import contextmanager, suppress
 from hashlib import sha256
 from pathlib import Path
 
+from guided_lgp.documents import written_whole
 from guided_lgp.errors import InputError
 
 ACCEPTED = "a writable $XDG_CACHE_HOME of one's own"
@@ -137,16 +138,12 @@ def _content(file: Path) -> bytes | None:
 
 
 def _put(file: Path, content: bytes) -> None:
-    """Put a file in place whole, instead of whatever is there; links are replaced, not followed."""
-    descriptor, unfinished = tempfile.mkstemp(prefix=f"{_UNFINISHED}{file.name}-", dir=file.parent)
-    try:
-        with os.fdopen(descriptor, "wb") as stream:
-            stream.write(content)
-        if file.is_dir() and not file.is_symlink():
-            _remove(file)
-        Path(unfinished).replace(file)
-    finally:
-        Path(unfinished).unlink(missing_ok=True)
+    """Put a file in place whole, instead of whatever is there."""
+    if file.is_dir() and not file.is_symlink():
+        _remove(file)
+    with written_whole(file) as unfinished:
+        unfinished.write_bytes(content)
+        unfinished.chmod(0o600)
 
 
 @contextmanager

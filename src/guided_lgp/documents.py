@@ -23,7 +23,7 @@ from guided_lgp.errors import InputError
 
 LARGEST = 2**31
 """Bytes that a document may have: twice those of the scenes of a million configurations."""
-_SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
+_SURROGATE = r"\\u[dD][89a-fA-F]"
 STANDARD_OUTPUT = Path("-")
 _UNFINISHED = ".unfinished-"
 _LONGEST_END = 50
@@ -59,7 +59,7 @@ def read_json(path: Path, accepted: str = "") -> Any:
             parse_constant=_finite,
             object_pairs_hook=_without_duplicates,
         )
-        return _in_unicode(document) if _SURROGATE.search(text) else document
+        return _in_unicode(document) if re.search(_SURROGATE, text) else document
     except UnicodeDecodeError as error:
         raise InputError(where, f"is not UTF-8 at byte {error.start}", accepted) from None
     except RecursionError:
@@ -120,7 +120,7 @@ def read_yaml(path: Path, accepted: str = "") -> Any:
     """
     where = str(path)
     try:
-        return yaml.load(path.read_text(encoding="utf-8"), _Loader)
+        return _Loader(path.read_text(encoding="utf-8")).get_single_data()
     except OSError as error:
         raise InputError(where, error.strerror or "cannot be read", accepted) from None
     except RecursionError:
@@ -235,7 +235,7 @@ def written_whole(path: Path) -> Iterator[Path]:
             with suppress(OSError):  # of file systems without locks
                 fcntl.flock(descriptor, fcntl.LOCK_EX)
             if path.is_file() and not path.is_symlink():
-                os.fchmod(descriptor, stat.S_IMODE(path.stat().st_mode))
+                os.fchmod(descriptor, path.stat().st_mode & 0o777 | stat.S_IWUSR)
             yield unfinished
             os.fsync(descriptor)
             unfinished.replace(path)
