@@ -3,6 +3,7 @@
 import json
 import resource
 import runpy
+import shlex
 import signal
 import subprocess
 import sys
@@ -382,8 +383,9 @@ def test_the_python_interface_from_the_documentation() -> None:
     assert done.stdout.startswith("(grasp")
 
 
-def test_a_closed_pipe_is_no_error() -> None:
-    words = f"{sys.executable} -m guided_lgp.cli schema params | head -c 20"
+@pytest.mark.parametrize("command", [["schema", "params"], [*PLAN, "--html", "-"]])
+def test_a_closed_pipe_is_no_error(command: list[str]) -> None:
+    words = f"{sys.executable} -m guided_lgp.cli {shlex.join(command)} | head -c 20"
     done = subprocess.run(
         ["bash", "-o", "pipefail", "-c", words],
         cwd=ROOT,
