@@ -17,8 +17,8 @@ from pathlib import Path
 from guided_lgp.cache import is_whole, made, private_folder
 
 _FLAGS = ("-O2", "-fPIC", "-shared", "-fno-math-errno")
-_LONGEST = 300.0
-"""Seconds that a compiler may take: half a minute, and up to two on a busy machine."""
+_LONGEST = 120.0
+"""Seconds that a compiler may take; the first run of ziglang's takes a quarter of it."""
 _PROBE = "guided_lgp_probe"
 _CHECK = """
 import ctypes, sys
