@@ -25,6 +25,7 @@ from guided_lgp.params import Params, load_params
 from guided_lgp.planning import plan
 from guided_lgp.scene import load_scene
 from guided_lgp.scene.bullet import pybullet
+from guided_lgp.scene.world import world_of
 
 ROOT = Path(__file__).parents[1]
 PLANS, EXPERIMENTS = 500, 200
@@ -79,9 +80,11 @@ def many_plans(count: int) -> Plans:
     start, before, solved = time.process_time(), 0, 0
     for number in range(count):
         objective = OBJECTIVES[number % len(OBJECTIVES)]
-        solved += plan(scene, objective, params=params).solved
+        other = scene.model_copy(update={"name": f"scene {number}"})  # with a world of its own
+        solved += plan(other, objective, params=params).solved
         if number < WARM_UP:
             before = process.memory_info().rss
+    world_of.cache_clear()  # the world of the last scene is kept
     clients = sum(map(pybullet.isConnected, range(CLIENTS)))
     growth = (process.memory_info().rss - before) / 2**20
     return Plans(solved, clients, growth, time.process_time() - start)
