@@ -18,7 +18,7 @@ from guided_lgp.bounds.coarse import CoarseBound
 from guided_lgp.bounds.execution import execute
 from guided_lgp.bounds.path import PathBound
 from guided_lgp.bounds.results import CoarseResult
-from guided_lgp.logic import Goal, Skeleton, State, applicable_actions, successor
+from guided_lgp.logic import Goal, Skeleton, State, applicable_actions, progress, successor
 from guided_lgp.params import load_params
 from guided_lgp.paths import PARAMS
 from guided_lgp.scene import Scene
@@ -88,7 +88,7 @@ def _sample(
     if result.trajectory is None:
         print(f"K={length} {scene.name}: {result.failure}", file=sys.stderr)
         return Sample(verified=False, goals_hold=False, time_s=elapsed)
-    goals = _goals(scene.state, result.skeleton)
+    goals = goals_after(scene.state, result.skeleton)
     report = execute(scene, goals, result.skeleton, result.trajectory)
     return Sample(verified=True, goals_hold=report.success, time_s=elapsed)
 
@@ -121,10 +121,9 @@ def _feasible(
     return result
 
 
-def _goals(state: State, skeleton: Skeleton) -> tuple[Goal, ...]:
+def goals_after(state: State, skeleton: Skeleton) -> tuple[Goal, ...]:
     """Everything that should hold after a sequence."""
-    for action in skeleton:
-        state = successor(state, action)
+    state = progress(state, skeleton)
     held = (Goal("held", (box,)) for box, _ in state.held)
     return (*held, *(Goal("on", (box, table)) for box, table in state.support))
 

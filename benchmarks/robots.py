@@ -16,11 +16,12 @@ import numpy as np
 
 from guided_lgp.bounds.execution import execute
 from guided_lgp.bounds.scene_bounds import SceneBounds
-from guided_lgp.logic import Goal, Skeleton, State, applicable_actions, successor
+from guided_lgp.logic import Skeleton, applicable_actions, successor
 from guided_lgp.params import load_params
 from guided_lgp.paths import SOURCES
 from guided_lgp.scene.footprints import footprint, gap, inset
 from guided_lgp.scene.model import Box, PlacedRobot, Scene, Table
+from path import goals_after
 
 SEED = 20_000
 PER_SCENE = 5
@@ -122,7 +123,7 @@ def _outcome(scene: Scene, bounds: SceneBounds, skeleton: Skeleton) -> list[str]
     if result.trajectory is None:
         print(f"{scene.name} {' '.join(map(str, skeleton))}: {result.failure}", file=sys.stderr)
         return ["feasible"]
-    goals = _goals(scene.state, skeleton)
+    goals = goals_after(scene.state, skeleton)
     report = execute(scene, goals, skeleton, result.trajectory)
     if not report.success:
         print(f"{scene.name} {' '.join(map(str, skeleton))}: {report}", file=sys.stderr)
@@ -136,14 +137,6 @@ def _random(scene: Scene, length: int, rng: np.random.Generator) -> Skeleton:
         skeleton = (*skeleton, actions[int(rng.integers(len(actions)))])
         state = successor(state, skeleton[-1])
     return skeleton
-
-
-def _goals(state: State, skeleton: Skeleton) -> tuple[Goal, ...]:
-    """Everything that should hold after a sequence."""
-    for action in skeleton:
-        state = successor(state, action)
-    held = (Goal("held", (box,)) for box, _ in state.held)
-    return (*held, *(Goal("on", (box, table)) for box, table in state.support))
 
 
 if __name__ == "__main__":

@@ -54,19 +54,28 @@ def test_links_and_named_sources_exist(page: Path, rendered: Path) -> None:
         assert (ROOT / "src/guided_lgp" / name).exists(), name
 
 
+def run_script(script: str, sources: Path | None = None) -> subprocess.CompletedProcess[str]:
+    """Run an example on the sources of a folder, or on those that are installed."""
+    environment = os.environ | ({} if sources is None else {"PYTHONPATH": str(sources)})
+    return subprocess.run(
+        [sys.executable, "-c", script],
+        cwd=ROOT,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
 def test_the_example_domain_is_one_file(tmp_path: Path) -> None:
     declaration, script, *_ = blocks(ROOT / "docs/extending.md", "python")
     file = tmp_path / declaration.splitlines()[0].removeprefix("# ")
     shutil.copytree(ROOT / "src/guided_lgp", tmp_path / "src/guided_lgp")
     file.write_text(declaration, encoding="utf-8")
-    command = [sys.executable, "-c", script]
-    environment = os.environ | {"PYTHONPATH": str(tmp_path / "src")}
-    done = subprocess.run(
-        command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False
-    )
+    done = run_script(script, tmp_path / "src")
     assert done.returncode == 0, done.stderr
     assert re.fullmatch(r"\(unstack \S+ red tab1\) \(place \S+ red green\)\n", done.stdout)
-    unchanged = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    unchanged = run_script(script)
     assert "unknown 'blocks' (accepted: handover, pick_and_place)" in unchanged.stderr
 
 
@@ -76,12 +85,8 @@ def test_the_example_policy_is_one_package(tmp_path: Path) -> None:
     shutil.copytree(ROOT / "src/guided_lgp", tmp_path / "src/guided_lgp")
     file.parent.mkdir()
     file.write_text(declaration, encoding="utf-8")
-    command = [sys.executable, "-c", script]
-    environment = os.environ | {"PYTHONPATH": str(tmp_path / "src")}
-    done = subprocess.run(
-        command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False
-    )
+    done = run_script(script, tmp_path / "src")
     assert done.returncode == 0, done.stderr
     assert re.fullmatch(r"\(grasp \S+ red\) \(place \S+ red green\)\n", done.stdout)
-    unchanged = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    unchanged = run_script(script)
     assert "policy 'goals_first': is unknown" in unchanged.stderr
