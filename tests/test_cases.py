@@ -21,6 +21,10 @@ ELEVEN = [f"(on b{number} right)" for number in range(1, 12)]
         ("sussman", ["(on a b)", "(on b c)"], 5),
         # A neighbour on either side must go first.
         ("blocked_both_sides", ["(on target right)"], 5),
+        # Bodies collide where they are: a board under another one is a place like any other.
+        ("into_shelf_24cm", ["(on red board)"], 2),
+        ("into_shelf_45cm", ["(on red board)"], 2),
+        ("out_of_shelf_24cm", ["(on red left)"], 2),
         # More actions than the paper's limit of depth.
         ("twelve", ELEVEN, 22),
     ],

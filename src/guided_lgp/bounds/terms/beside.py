@@ -1,7 +1,7 @@
-"""``beside(box, support)``: a box that comes down from above, or goes up, passes its neighbours.
+"""``beside(box, support)``: a box that is put down, or lifted, passes its neighbours.
 
-A line, seen from above, separates the box and each neighbour that reaches as high: its angle is a
-variable of the pair.
+A line, seen from above, separates the box and each neighbour that it meets on its straight way: its
+angle is a variable of the pair. What ends below the box, or begins above its way, is none.
 """
 
 from dataclasses import dataclass
@@ -68,11 +68,14 @@ def _add(context: Context, box: str, support: str | None = None) -> None:
 
 
 def _neighbours(context: Context, name: str, other: str) -> bool:
-    """Whether a box has to be separated from another body: it may move and is not above it."""
+    """Whether a box has to be separated from another body: one may move, and their heights meet."""
     first, second = context.pose[name], context.pose[other]
-    bottom = first.offset - context.half(name)[2]
-    top = second.offset + context.half(other)[2]
-    return (first.varies or second.varies) and first.z == second.z and top > bottom + _TOUCH
+    if first.z != second.z or not (first.varies or second.varies):
+        return False
+    rise = max((line.up for line in context.lines), default=0.0)
+    apart = second.offset - first.offset
+    reach = context.half(name)[2] + context.half(other)[2] - _TOUCH
+    return -reach < apart < reach + rise
 
 
 def _separate(context: Context, name: str, other: str) -> None:

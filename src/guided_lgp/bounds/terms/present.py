@@ -3,6 +3,7 @@
 It is held where another hand reaches it: as a support, or to take it.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,8 +18,10 @@ _CANDIDATES = 6
 """Poses drawn, of which the best to reach is taken."""
 _PLACE = (0.55, 0.0, 0.95)
 """Where a box is held out, in the robot's frame: the start of the search (m)."""
+_FORWARD, _SIDEWAYS = (0.2, 0.9), (-0.6, 0.6)
+"""Where it may be held out, in the robot's frame (m)."""
 _ABOVE = 0.02
-"""How far (m) its bottom is at least above all that stands."""
+"""How far (m) its bottom is at least above all that stands there."""
 
 
 @dataclass(frozen=True)
@@ -66,17 +69,33 @@ def _add(context: Context, body: str, by: str | None = None) -> None:
 
 
 def _variable_pose(context: Context, box: str) -> PlanarPose:
-    """Above all that stands."""
-    tops = (context.top(name) for name in context.pose if name != box)
+    """Above all that stands in front of the robot; a high shelf beside it does not count."""
+    reach = math.hypot(*context.half(box)[:2])
+    tops = (
+        context.top(name) for name in context.pose if name != box and _below(context, name, reach)
+    )
     lowest = context.half(box)[2] + _ABOVE + max(tops)
     side = context.robot.arms[context.held[box].gripper].left
     x, y, z = _PLACE
     return PlanarPose(
-        context.program.variable(0.2, 0.9, 0.01, x),
-        context.program.variable(-0.6, 0.6, 0.01, y * side),
+        context.program.variable(*_FORWARD, 0.01, x),
+        context.program.variable(*_SIDEWAYS, 0.01, y * side),
         context.program.variable(-2 * np.pi, 2 * np.pi, 1e-3, 0.0),
         context.program.variable(lowest, 1.5, 0.01, z),
         0.0,
+    )
+
+
+def _below(context: Context, name: str, reach: float) -> bool:
+    """Whether what is held out, ``reach`` (m) about its centre, may be above or below a body."""
+    if context.pose[name].varies:
+        return True
+    reach += math.hypot(*context.half(name)[:2])
+    return all(
+        low - reach < place < high + reach
+        for place, (low, high) in zip(
+            context.geometry.poses[name][:2], (_FORWARD, _SIDEWAYS), strict=True
+        )
     )
 
 
