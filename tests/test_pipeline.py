@@ -112,6 +112,12 @@ def test_every_dependency_exists_or_is_made_by_a_stage() -> None:
             assert dependency in made or (ROOT / dependency).exists(), dependency
 
 
+def test_every_figure_is_a_plot_once() -> None:
+    figures = {path.stem for path in (ROOT / "reports/figures").glob("*.svg")}
+    plots = [plot for plot in pipeline()["plots"] if isinstance(plot, str)]
+    assert sorted(plots) == sorted(f"reports/figures/{name}.png" for name in figures)
+
+
 def test_stages_read_declared_parameters_only() -> None:
     sections = {name for name in Params.model_fields if name not in ("parallel", "bounds")}
     assert sections < set(pipeline()["stages"])
@@ -204,7 +210,13 @@ class TestSmallProfile:
         reports = clone.folder / "reports"
         metrics = {
             name: json.loads((reports / "metrics" / f"{name}.json").read_text())
-            for name in ("generalization", "scalability", "scalability_timing", "training")
+            for name in (
+                "generalization",
+                "scalability",
+                "scalability_timing",
+                "summary",
+                "training",
+            )
         }
         shares = metrics["generalization"]["adaptation"]["all"]
         assert 0 < shares["n"] <= 87
@@ -254,7 +266,8 @@ class TestSmallProfile:
         assert len(client.search_runs([experiment.experiment_id])) == len(runs)
 
     def test_metrics_plots_and_graph_can_be_shown(self, clone: Clone) -> None:
-        assert "generalization.json" in clone.dvc("metrics", "show")
+        assert "summary.json" in clone.dvc("metrics", "show")
+        assert "peak_rss_mb" in clone.dvc("metrics", "show", str(TIMING))
         assert "index.html" in clone.dvc("plots", "show")
         assert "train_policy@place" in clone.dvc("dag")
 
@@ -266,6 +279,7 @@ class TestSmallProfile:
         after = clone.lock()
         assert [name for name in after if after[name] != before[name]] == ["train_policy@place"]
         assert "evaluate_generalization" in clone.dvc("status")
+        assert clone.dvc("metrics", "diff", "--all").count("summary.json") <= 15
 
     def test_bad_parameters_stop_a_stage_before_it_computes(self, clone: Clone) -> None:
         file = clone.folder / "params.yaml"

@@ -118,6 +118,16 @@ def test_training_metrics(rendered: Path) -> None:
     assert {"accuracy", "loss", "epochs"} <= table["by_configuration"].keys()
 
 
+def test_the_summary_is_short_and_without_times(rendered: Path) -> None:
+    figures = json.loads((rendered / METRICS / "summary.json").read_text(encoding="utf-8"))
+    assert sum(map(len, figures.values())) <= 15
+    assert figures["shortest"] == {"default": 0.9, "adaptation": 0.95, "relational": 0.995}
+    assert list(figures["accuracy"]) == ["instruction", "grasp", "place", "relational"]
+    assert figures["solved"] == {"guided": 1.0, "relational": 1.0}
+    assert figures["coarse_calls"] == pytest.approx({"guided": 1.1, "relational": 1.1})
+    assert not any(name.endswith("_s") for group in figures.values() for name in group)
+
+
 def test_pages_hold_the_tables_and_the_findings(rendered: Path, tmp_path: Path) -> None:
     shutil.copytree(rendered, tmp_path / "clone")
     readme = tmp_path / "clone/README.md"

@@ -19,6 +19,7 @@ from guided_lgp.report import analysis, figures, scalability_figures, scalabilit
 from guided_lgp.report.contents import compose
 from guided_lgp.report.drawing import save
 from guided_lgp.report.inputs import Inputs, Metrics, compared, load_inputs
+from guided_lgp.report.summary import summary
 from guided_lgp.report.table import Table
 from guided_lgp.search.planners import GUIDED, RIVALS, TABLE_3
 from guided_lgp.view.pictures import draw_scene
@@ -33,7 +34,10 @@ logger = logging.getLogger(__name__)
 
 
 def run(params: Params, root: Path) -> None:
-    """Write ``reports/metrics/training.json`` and the report with its tables, figures and replays.
+    """Write the report with its tables, figures and replays, and two files of metrics.
+
+    ``reports/metrics/training.json`` has what the networks' training says, ``summary.json`` the
+    figures by which executions of the pipeline are compared.
 
     Args:
         params: limits and seeds, which the report names.
@@ -49,6 +53,7 @@ def run(params: Params, root: Path) -> None:
         shutil.rmtree(reports / folder, ignore_errors=True)
         (reports / folder).mkdir(parents=True)
     write_json(root / METRICS / "training.json", tables.training_metrics(inputs.training))
+    write_json(root / METRICS / "summary.json", summary(inputs))
     _write_curves(inputs, reports / "curves")
     novelty = _novelty(inputs, params)
     calls = analysis.calls_per_action(inputs.problems)
