@@ -17,6 +17,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import against
 import coarse
 import path
 import pipeline
@@ -51,6 +52,7 @@ MEASURES: dict[str, Callable[[int], Any]] = {
     "planners": lambda count: pipeline.planners(),
     "training": lambda count: pipeline.training(),
     "memory": lambda count: pipeline.memory(),
+    "against": lambda count: against.measure(),
 }
 """By part, what measures it, given the number of sequences per length."""
 
@@ -62,6 +64,8 @@ def main(parts: list[str], count: int) -> None:
     for name in parts or MEASURES:
         logger.info(name)
         figures[name] = MEASURES[name](count)
+        if name == "against":
+            figures["speedup"] = against.ratios(figures[name])
         write_json(target, figures)
     geometry: dict[str, dict[str, Any]] = {}
     for bound in ("coarse_bound", "path_bound"):

@@ -39,9 +39,21 @@ def test_every_part_has_a_table_and_ratios_come_from_one_run() -> None:
         "guided_best_first": cell(0.2),
         "relational": cell(0.05),
     }
+    twice = {"n": 5, "old_median_ms": 20.0, "new_median_ms": 10.0, "ratio": 2.0}
+    unchanged = {"changed_to_feasible": 3, "changed_to_infeasible": 0}
+    kinds = ("feasible", "infeasible", "infeasible_without_fact")
+    against = {
+        "baseline": "50577ca",
+        "coarse_bound": dict.fromkeys(kinds, twice) | unchanged,
+        "coarse_step": twice,
+        "enumeration": twice,
+        "path_bound": {"2": twice | unchanged, "10": {"n": 0} | unchanged},
+        "plan_process": {"3": twice},
+    }
     page = benchmark_page(
         {
             "machine": MACHINE,
+            "against": against,
             "coarse_bound": {"4": coarse | {"ipopt": ipopt}},
             "path_bound": {"4": motion | {"physics_success_share": 0.98}},
             "enumeration": {"1": 80.0, "2": 150.0},
@@ -51,8 +63,11 @@ def test_every_part_has_a_table_and_ratios_come_from_one_run() -> None:
         }
     )
     assert "A CPU, 2 cores, 8.0 GB" in page
-    assert page.count("\n**") == 6
+    assert page.count("\n**") == 7
     lines = page.splitlines()
+    assert "| path bound, K = 2 | 20.0 | 10.0 | 2.0× | 5 |" in lines
+    assert not any("K = 10" in line for line in lines)
+    assert "Verdicts that changed: 9 from infeasible to feasible, 0 from" in page
     row = next(line for line in lines if line.startswith(r"| c.1\*"))
     assert [text.strip() for text in row.strip("|").split("|")] == [
         *(r"c.1\*", "8", "0.600", "0.150"),

@@ -1,0 +1,293 @@
+"""Benchmark of this version against an older one, both run here and now, in turns.
+
+The older one is checked out beside the repository for the time of the run; no stored time enters
+a ratio. All ratios are its CPU time divided by this version's: python benchmarks/against.py [PART]
+"""
+
+import json
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import numpy as np
+
+ROOT = Path(__file__).parents[1]
+BASELINE = "50577ca"
+"""The version that all later ones are measured against."""
+VERSIONS = ("old", "new")
+LENGTHS = tuple(range(2, 11))
+SEED = 20_004
+SCENES = 20
+"""Configurations per setup, as in ``version.py``."""
+PATHS = 12
+"""Sequences per length."""
+WALKS = {"a": 100, "e10": 20}
+"""Random walks by setup: the one of the enumeration, and the largest of the searches."""
+ENUMERATED = 3
+"""Configurations."""
+LONG, STEPS, ATTEMPTS = 40, 100, 200
+"""Actions of the long program, steps of the solver on it, and actions tried on the way."""
+RUNS = 5
+"""Of the command per scene; the first one fills caches and is not counted."""
+TOWER = ("purple", "yellow", "blue", "green", "red", "tray")
+COMMANDS = {
+    "3": ("three_boxes.json", ("(on red green)", "(held blue)")),
+    "10": (
+        "ten_boxes.json",
+        tuple(f"(on {upper} {lower})" for upper, lower in pairwise(TOWER)),
+    ),
+}
+"""By number of actions: what the command plans."""
+
+
+class Version:
+    """A process that runs on the sources of one version."""
+
+    def __init__(self, sources: Path) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, str(ROOT / "benchmarks" / "version.py")],
+            env=environment(sources),
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+
+    def ask(self, *request: Any) -> Any:
+        """The answer to one request."""
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        print(json.dumps(request), file=self._process.stdin, flush=True)
+        return json.loads(self._process.stdout.readline())
+
+    def close(self) -> None:
+        """End the process."""
+        self._process.communicate()
+
+
+def environment(sources: Path) -> dict[str, str]:
+    """Variables of a process on some sources; one thread, as the ratios are of CPU time."""
+    return os.environ | {"PYTHONPATH": str(sources), "OMP_NUM_THREADS": "1"}
+
+
+@dataclass
+class Pair:
+    """Both versions, asked in turns; who is first changes with every request."""
+
+    old: Version
+    new: Version
+    asked: int = field(default=0)
+
+    def ask(self, *request: Any) -> dict[str, Any]:
+        """Both answers, by version."""
+        self.asked += 1
+        order = VERSIONS if self.asked % 2 else VERSIONS[::-1]
+        answers = {name: getattr(self, name).ask(*request) for name in order}
+        return {name: answers[name] for name in VERSIONS}
+
+
+@contextmanager
+def baseline() -> Iterator[Path]:
+    """The sources of the older version, in a worktree that is there for as long as it is needed."""
+    with tempfile.TemporaryDirectory() as folder:
+        tree = Path(folder) / "baseline"
+        git = ["git", "-C", str(ROOT), "worktree"]
+        subprocess.run([*git, "add", "-q", "--detach", str(tree), BASELINE], check=True)
+        try:
+            yield tree / "src"
+        finally:
+            subprocess.run([*git, "remove", "--force", str(tree)], check=True)
+
+
+@contextmanager
+def both() -> Iterator[Pair]:
+    """Processes of both versions."""
+    with baseline() as sources:
+        pair = Pair(Version(sources), Version(ROOT / "src"))
+        try:
+            yield pair
+        finally:
+            pair.old.close()
+            pair.new.close()
+
+
+def measure() -> dict[str, Any]:
+    """Every ratio, and the times and numbers behind it."""
+    with both() as pair:
+        figures = {name: part(pair) for name, part in PARTS.items()}
+    return {"baseline": BASELINE} | figures | {"plan_process": processes()}
+
+
+def coarse_bound(pair: Pair) -> dict[str, Any]:
+    """Verdicts of the coarse bound along random walks that end at the first infeasible one."""
+    verdicts = [v for setup, count in WALKS.items() for v in _walks(pair, setup, count)]
+    same = {feasible: [v for v in verdicts if _both(v, feasible)] for feasible in (True, False)}
+    unexplained = [v for v in same[False] if v["new"]["starts"]]
+    changed = [v for v in verdicts if v["old"]["feasible"] != v["new"]["feasible"]]
+    return {
+        "feasible": summary(same[True]),
+        "infeasible": summary(same[False]),
+        "infeasible_without_fact": summary(unexplained),
+        "changed_to_feasible": sum(v["new"]["feasible"] for v in changed),
+        "changed_to_infeasible": sum(v["old"]["feasible"] for v in changed),
+    }
+
+
+def _walks(pair: Pair, setup: str, count: int) -> Iterator[dict[str, Any]]:
+    """Verdicts of both versions along random sequences, by version."""
+    rng = np.random.default_rng([SEED, count])
+    for walk in range(count):
+        number = walk * SCENES // count
+        words: list[str] = []
+        while len(words) < max(LENGTHS):
+            words.append(_random(pair, setup, number, words, rng))
+            verdict = pair.ask("coarse", setup, number, words)
+            yield verdict
+            if not _both(verdict, True):
+                break
+
+
+def _random(pair: Pair, setup: str, number: int, words: list[str], rng: np.random.Generator) -> str:
+    choices = pair.new.ask("choices", setup, number, words)
+    return str(choices[rng.integers(len(choices))])
+
+
+def _both(verdict: dict[str, Any], feasible: bool) -> bool:
+    return all(verdict[name]["feasible"] is feasible for name in VERSIONS)
+
+
+def path_bound(pair: Pair) -> dict[str, Any]:
+    """Path bound and its verification on random coarse-feasible sequences of setup a."""
+    rng = np.random.default_rng([SEED, 1])
+    figures = {}
+    for length in LENGTHS:
+        verdicts = [
+            pair.ask("path", "a", number, _feasible(pair, "a", number, length, rng))
+            for number in range(PATHS)
+        ]
+        changed = [v for v in verdicts if v["old"]["feasible"] != v["new"]["feasible"]]
+        figures[str(length)] = summary(verdicts) | {
+            "changed_to_feasible": sum(v["new"]["feasible"] for v in changed),
+            "changed_to_infeasible": sum(v["old"]["feasible"] for v in changed),
+        }
+    return figures
+
+
+def _feasible(
+    pair: Pair, setup: str, number: int, length: int, rng: np.random.Generator
+) -> list[str]:
+    """A random sequence, feasible for both: what is not is drawn again, or else the whole of it."""
+    words: list[str] = []
+    for _ in range(ATTEMPTS):
+        if len(words) == length:
+            return words
+        longer = [*words, _random(pair, setup, number, words, rng)]
+        if _both(pair.ask("coarse", setup, number, longer), True):
+            words = longer
+    return _feasible(pair, setup, number, length, rng)
+
+
+def enumeration(pair: Pair) -> dict[str, Any]:
+    """Verdicts per second of the stage that enumerates setup a."""
+    answers = [pair.ask("enumeration", "a", number) for number in range(ENUMERATED)]
+    figures = summary(answers)
+    totals = {v: sum(a[v]["seconds"] for a in answers) for v in VERSIONS}
+    rates = {v: sum(a[v]["verdicts"] for a in answers) / totals[v] for v in VERSIONS}
+    return figures | {
+        "old_per_s": rates["old"],
+        "new_per_s": rates["new"],
+        "ratio": rates["new"] / rates["old"],
+    }
+
+
+def coarse_step(pair: Pair) -> dict[str, Any]:
+    """One step of the solver on a program of 40 actions with ten boxes."""
+    rng = np.random.default_rng([SEED, 2])
+    words = _feasible(pair, "e10", 0, LONG, rng)
+    return summary([pair.ask("step", "e10", 0, words, STEPS) for _ in range(RUNS)])
+
+
+def processes() -> dict[str, Any]:
+    """The command, warm: a process of its own from start to end."""
+    with baseline() as sources:
+        trees = {"old": sources, "new": ROOT / "src"}
+        figures = {}
+        for length, (scene, goals) in COMMANDS.items():
+            runs = [
+                {name: {"seconds": _run(trees[name], scene, goals)} for name in VERSIONS}
+                for _ in range(RUNS)
+            ]
+            figures[length] = summary(runs[1:])
+        return figures
+
+
+def _run(sources: Path, scene: str, goals: tuple[str, ...]) -> float:
+    """CPU seconds of one plan."""
+    words = [part for goal in goals for part in ("--goal", goal)]
+    code = "from guided_lgp.cli import main; main()"
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run(
+        [sys.executable, "-c", code, "plan", str(ROOT / "examples" / scene), *words],
+        env=environment(sources),
+        stdout=subprocess.DEVNULL,
+        check=True,
+    )
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def summary(answers: list[dict[str, Any]]) -> dict[str, Any]:
+    """Medians in ms, and the median of the ratios."""
+    seconds = {v: [answer[v]["seconds"] for answer in answers] for v in VERSIONS}
+    if not answers:
+        return {"n": 0}
+    ratios = [old / new for old, new in zip(seconds["old"], seconds["new"], strict=True)]
+    return {
+        "n": len(answers),
+        "old_median_ms": median(seconds["old"]) * 1e3,
+        "new_median_ms": median(seconds["new"]) * 1e3,
+        "ratio": median(ratios),
+    }
+
+
+PARTS: dict[str, Callable[[Pair], Any]] = {
+    "coarse_bound": coarse_bound,
+    "path_bound": path_bound,
+    "enumeration": enumeration,
+    "coarse_step": coarse_step,
+}
+
+
+def ratios(figures: dict[str, Any]) -> dict[str, Any]:
+    """``speedup``: one number per row, old CPU time divided by new."""
+    coarse = figures["coarse_bound"]
+    return {
+        "path_bound": {length: row["ratio"] for length, row in figures["path_bound"].items()},
+        "coarse_infeasible": coarse["infeasible"]["ratio"],
+        "coarse_infeasible_without_fact": coarse["infeasible_without_fact"]["ratio"],
+        "coarse_feasible": coarse["feasible"]["ratio"],
+        "enumeration": figures["enumeration"]["ratio"],
+        "plan_process": {length: row["ratio"] for length, row in figures["plan_process"].items()},
+        "coarse_step_k40": figures["coarse_step"]["ratio"],
+    }
+
+
+def main(names: list[str]) -> None:
+    """Print the figures of some parts."""
+    if names == ["plan_process"]:
+        print(json.dumps(processes(), indent=1))
+        return
+    with both() as pair:
+        print(json.dumps({name: PARTS[name](pair) for name in names or PARTS}, indent=1))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,176 @@
+"""One version of the planner as a process that measures what it is told, for ``against.py``.
+
+Reads one request per line, a JSON list, and answers each with one line of JSON. It runs on the
+sources in ``PYTHONPATH``, be it these or those of an older version, so it imports only what both
+have, under either name. Times are CPU seconds of this process.
+"""
+
+import json
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from contextlib import redirect_stdout
+from dataclasses import replace
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+
+from guided_lgp.experiments import enumerate_sequences
+from guided_lgp.logic import applicable_actions, successor
+from guided_lgp.params import load_params
+from guided_lgp.paths import SOURCES
+from guided_lgp.scene import generate
+
+PARAMETERS = load_params(SOURCES / "params.yaml")
+SEED = 20_004
+"""Of the scenes; no stage of the pipeline uses it."""
+SCENES = 20
+"""Configurations per setup."""
+
+
+def either(*names: str) -> Any:
+    """The first module of these that there is."""
+    for name in names:
+        try:
+            return import_module(f"guided_lgp.{name}")
+        except ModuleNotFoundError:
+            continue
+    raise ModuleNotFoundError(names[0])
+
+
+bounds = either("bounds.scene_bounds", "nlp.bounds")
+coarse = either("bounds.coarse", "nlp.coarse")
+solvers = either("bounds.coarse.solver", "nlp.coarse.solver")
+
+
+@cache
+def scenes(setup: str) -> Any:
+    """The configurations of a setup, the same ones in every version."""
+    return generate(setup, SCENES, SEED, "bench").scenes
+
+
+class Here:
+    """The bounds of the scene that was asked for last."""
+
+    def __init__(self, setup: str, number: int) -> None:
+        self.place = setup, number
+        self.scene = scenes(setup)[number]
+        self.bounds = bounds.SceneBounds(self.scene, PARAMETERS.bounds)
+
+    def skeleton(self, words: list[str]) -> Any:
+        """The actions with these names."""
+        state, actions = self.scene.state, []
+        for word in words:
+            by_name = {str(a): a for a in applicable_actions(state, self.scene.symbols)}
+            actions.append(by_name[word])
+            state = successor(state, actions[-1])
+        return tuple(actions)
+
+
+_here: list[Here] = []
+
+
+def here(setup: str, number: int) -> Here:
+    """The bounds of a scene."""
+    if not _here or _here[0].place != (setup, number):
+        _here[:] = [Here(setup, number)]
+    return _here[0]
+
+
+def choices(setup: str, number: int, words: list[str]) -> list[str]:
+    """The actions that are applicable after others."""
+    place = here(setup, number)
+    state = place.scene.state
+    for action in place.skeleton(words):
+        state = successor(state, action)
+    return [str(action) for action in applicable_actions(state, place.scene.symbols)]
+
+
+def coarse_verdict(setup: str, number: int, words: list[str]) -> dict[str, Any]:
+    """The coarse bound of a skeleton whose prefix is known."""
+    place = here(setup, number)
+    skeleton = place.skeleton(words)
+    if len(skeleton) > 1:
+        place.bounds.coarse(skeleton[:-1])
+    began = time.process_time()
+    result = place.bounds.coarse(skeleton)
+    seconds = time.process_time() - began
+    starts = result.restarts if hasattr(result, "restarts") else result.tries
+    return {"feasible": result.feasible, "seconds": seconds, "starts": starts}
+
+
+def path_verdict(setup: str, number: int, words: list[str]) -> dict[str, Any]:
+    """The path bound of a skeleton whose coarse solution is known, its verification included."""
+    place = here(setup, number)
+    skeleton = place.skeleton(words)
+    place.bounds.coarse(skeleton)
+    getattr(place.bounds, "_path_bound", None)  # made when first asked for, since some version
+    began = time.process_time()
+    result = place.bounds.path(skeleton)
+    return {"feasible": result.feasible, "seconds": time.process_time() - began}
+
+
+def enumeration(setup: str, number: int) -> dict[str, Any]:
+    """All verdicts of one configuration, as the stage of the pipeline asks for them."""
+    with tempfile.TemporaryDirectory() as folder:
+        task = enumerate_sequences.Task(
+            scenes(setup)[number], PARAMETERS.bounds, PARAMETERS.enumerate_sequences, Path(folder)
+        )
+        began = time.process_time()
+        enumerate_sequences.write_shard(task)
+        seconds = time.process_time() - began
+        rows = pq.read_metadata(task.shard / "verdicts.parquet").num_rows
+    return {"verdicts": rows, "seconds": seconds}
+
+
+class Recorder:
+    """A solver that remembers the last program."""
+
+    def __init__(self, solver: Any) -> None:
+        self._solver = solver
+        self.reach = solver.reach
+
+    def solve(self, program: Any, values: Any, settings: Any) -> Any:
+        """As the solver does."""
+        self.last = program, np.array(values)
+        return self._solver.solve(program, values, settings)
+
+
+def step(setup: str, number: int, words: list[str], steps: int) -> dict[str, Any]:
+    """Seconds per step of the solver on the program of a skeleton, off its solution."""
+    place = here(setup, number)
+    skeleton = place.skeleton(words)
+    robot = getattr(place.scene.robot, "description", None)
+    solver = solvers.default_solver(*([] if robot is None else [robot]))
+    recorder = Recorder(solver)
+    bound = coarse.CoarseBound(place.scene, 1, recorder)
+    bound.solve(skeleton, place.bounds.coarse(skeleton[:-1]))
+    program, values = recorder.last
+    noise = np.random.default_rng(0).normal(scale=0.1, size=len(program.lower))
+    values[: len(noise)] = np.clip(values[: len(noise)] + noise, program.lower, program.upper)
+    endless = replace(solvers.Settings(), tolerance=-1.0, steps=steps, patience=steps)
+    began = time.process_time()
+    solution = solver.solve(program, values, endless)
+    return {"seconds": (time.process_time() - began) / solution.steps}
+
+
+REQUESTS: dict[str, Callable[..., Any]] = {
+    "choices": choices,
+    "coarse": coarse_verdict,
+    "path": path_verdict,
+    "enumeration": enumeration,
+    "step": step,
+}
+
+if __name__ == "__main__":
+    answers = sys.stdout
+    for line in sys.stdin:
+        name, *arguments = json.loads(line)
+        with redirect_stdout(sys.stderr):
+            answer = REQUESTS[name](*arguments)
+        print(json.dumps(answer), file=answers, flush=True)
