@@ -7,7 +7,7 @@ from descriptions import plain
 
 from guided_lgp.errors import InputError
 from guided_lgp.robots.chain import Array
-from guided_lgp.robots.hand import HandShape, measure_hand
+from guided_lgp.robots.measures.hand import HandShape, measure_hand
 
 _MARGIN = 0.0025
 """PyBullet's hulls are a millimetre thicker on every side."""

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from descriptions import ARMS, TIAGO_PRO, ArmDescription
 
-from guided_lgp.robots import solvers
 from guided_lgp.robots.chain import Array
-from guided_lgp.robots.inverse import InverseKinematics
-from guided_lgp.robots.solvers import EXACT, Compiled, InNumpy, best_solver
+from guided_lgp.robots.inverse import InverseKinematics, solvers
+from guided_lgp.robots.inverse.solvers import EXACT, Compiled, InNumpy, best_solver
 
 _TARGETS = 500
 

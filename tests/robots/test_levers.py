@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from descriptions import ARMS, ArmDescription
 
-from guided_lgp.robots.levers import lever_arms
+from guided_lgp.robots.measures.levers import lever_arms
 
 
 @pytest.mark.parametrize("arm", ARMS.values(), ids=ARMS)

@@ -6,8 +6,8 @@ import pytest
 from descriptions import ARMS, ArmDescription
 
 from guided_lgp.robots.chain import read_joints
-from guided_lgp.robots.hulls import link_hulls
-from guided_lgp.robots.measures import ArmMeasures
+from guided_lgp.robots.measures.arm import ArmMeasures
+from guided_lgp.robots.measures.hulls import link_hulls
 
 _FROM_Z = np.array([[0.0, 0, -1], [0, 1, 0], [1, 0, 0]])
 _HANDS = {

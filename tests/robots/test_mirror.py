@@ -6,7 +6,7 @@ import numpy as np
 from descriptions import ARMS
 
 from guided_lgp.robots.chain import read_chain
-from guided_lgp.robots.mirror import mirror_of
+from guided_lgp.robots.measures.mirror import mirror_of
 
 
 def test_arms_of_pr2_and_baxter_are_mirror_images() -> None:

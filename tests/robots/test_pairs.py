@@ -4,7 +4,7 @@ import xml.etree.ElementTree as ET
 
 from descriptions import ARMS, description
 
-from guided_lgp.robots.pairs import sampled_pairs
+from guided_lgp.robots.measures.pairs import sampled_pairs
 
 
 def test_sampled_pairs_are_nearly_those_of_the_srdf() -> None:

@@ -7,8 +7,8 @@ import pybullet
 import pytest
 from descriptions import ARMS, ArmDescription
 
-from guided_lgp.robots.hulls import between, link_hulls
-from guided_lgp.robots.spheres import covering_spheres
+from guided_lgp.robots.measures.hulls import between, link_hulls
+from guided_lgp.robots.measures.spheres import covering_spheres
 
 _ROBOTS = {name: ARMS[name] for name in ("pr2, left", "panda", "ur5", "baxter", "tiago")}
 

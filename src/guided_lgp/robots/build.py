@@ -16,8 +16,8 @@ from guided_lgp.robots.document import (
     ToolDocument,
     read_document,
 )
-from guided_lgp.robots.measures import ArmMeasures
-from guided_lgp.robots.mirror import mirror_of
+from guided_lgp.robots.measures.arm import ArmMeasures
+from guided_lgp.robots.measures.mirror import mirror_of
 from guided_lgp.robots.robot import Arm, Fingers, Gap, Robot, Sphere, TurningGap
 
 _TWO_TURNS = (-2 * np.pi, 2 * np.pi)

@@ -17,7 +17,7 @@ from guided_lgp.cache import kept, made
 from guided_lgp.errors import InputError
 from guided_lgp.paths import DESCRIPTIONS
 from guided_lgp.robots.document import DescriptionFiles
-from guided_lgp.robots.pairs import sampled_pairs
+from guided_lgp.robots.measures.pairs import sampled_pairs
 
 _STL_FACET = np.dtype([("normal", "<f4", 3), ("vertices", "<f4", (3, 3)), ("attribute", "<u2")])
 _STL_HEADER = 84

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guided_lgp.poses import Array, rotation_matrix
-from guided_lgp.robots.inverse import inverse_kinematics
-from guided_lgp.robots.offset_shoulder import OffsetShoulder
+from guided_lgp.robots.inverse import OffsetShoulder, inverse_kinematics
 from guided_lgp.robots.robot import Robot
 
 _VALUES = 15
@@ -18,7 +17,7 @@ _TURN = 2 * np.pi
 
 
 class Solver(Protocol):
-    """All solutions of one arm in the frame of the robot's root, as in ``inverse.py``."""
+    """All solutions of one arm in the frame of the robot's root, as in ``inverse/general.py``."""
 
     def inverse(
         self, rotation: Array, position: Array, redundancy: Array

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from guided_lgp.robots.chain import Array
-from guided_lgp.robots.hulls import between
+from guided_lgp.robots.measures.hulls import between
 
 _MOST = 3
 """Spheres of one link."""

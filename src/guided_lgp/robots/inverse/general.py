@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from guided_lgp.poses import rotation_matrix
 from guided_lgp.robots.chain import Array, Chain, read_chain
+from guided_lgp.robots.inverse.solvers import EXACT, Problem, best_solver, free_screws
+from guided_lgp.robots.inverse.structures import Structure, closest
 from guided_lgp.robots.robot import Robot
-from guided_lgp.robots.solvers import EXACT, Problem, best_solver, free_screws
-from guided_lgp.robots.structures import Structure, closest
 
 _NEARLY = 0.05
 """Largest misfit (m, or sine of an angle) of a structure that is used as a first guess."""

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from guided_lgp.robots.chain import Array, Chain, Joint, path_between, read_chain, read_joints
-from guided_lgp.robots.hand import HandShape, measure_hand
-from guided_lgp.robots.hulls import link_hulls
-from guided_lgp.robots.levers import lever_arms
-from guided_lgp.robots.spheres import covering_spheres
+from guided_lgp.robots.measures.hand import HandShape, measure_hand
+from guided_lgp.robots.measures.hulls import link_hulls
+from guided_lgp.robots.measures.levers import lever_arms
+from guided_lgp.robots.measures.spheres import covering_spheres
 
 _LOAD = 0.15
 """Reach (m) of a held object or of the hand beyond the tool frame's origin, for the metric."""

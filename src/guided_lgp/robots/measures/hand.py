@@ -12,7 +12,7 @@ import numpy as np
 
 from guided_lgp.errors import InputError
 from guided_lgp.robots.chain import Array
-from guided_lgp.robots.hulls import between, link_hulls
+from guided_lgp.robots.measures.hulls import between, link_hulls
 
 _STEPS = 65
 """Values of the finger joints at which the gap is measured."""

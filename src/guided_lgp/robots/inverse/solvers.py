@@ -13,9 +13,9 @@ from typing import Protocol
 import numpy as np
 
 from guided_lgp.compiled import load_compiled
-from guided_lgp.robots import subproblems as sub
 from guided_lgp.robots.chain import Array, Chain, turn
-from guided_lgp.robots.structures import BRANCHES, Structure
+from guided_lgp.robots.inverse import subproblems as sub
+from guided_lgp.robots.inverse.structures import BRANCHES, Structure
 
 EXACT = 1e-8
 """Error (m, rad) up to which a solution counts as one; it is improved down to a tenth of it."""
@@ -23,6 +23,8 @@ DAMPING = 0.01
 """Of the squared singular values, for an error of one; it vanishes with the error."""
 LONGEST_STEP = 0.7
 """Of a joint in one iteration (rad)."""
+_SOURCES = ("subproblems.c", "structures.c", "inverse.c")
+"""The compiled form, each part after what it calls."""
 
 
 @dataclass(frozen=True)
@@ -72,8 +74,9 @@ def best_solver(problem: Problem) -> Solver:
 
 @cache
 def _library() -> ctypes.CDLL | None:
-    source = Path(__file__).with_name("inverse.c").read_text(encoding="utf-8")
-    return load_compiled("inverse", source)
+    folder = Path(__file__).parent
+    parts = [(folder / name).read_text(encoding="utf-8") for name in _SOURCES]
+    return load_compiled("inverse", "\n".join(parts))
 
 
 class _Arm(ctypes.Structure):

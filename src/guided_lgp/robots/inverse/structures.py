@@ -12,8 +12,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from guided_lgp.robots import subproblems as sub
 from guided_lgp.robots.chain import Array, turn
+from guided_lgp.robots.inverse import subproblems as sub
 
 Guess = Callable[[Array, Array, Array, Array], Array]
 """Axes, points, rotation (..., 3, 3) and shift (..., 3) to angles (..., branches, 6)."""

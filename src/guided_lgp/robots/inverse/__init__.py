@@ -1,0 +1,6 @@
+"""Inverse kinematics: of any arm of six or seven joints, and in closed form of one kind of arm."""
+
+from guided_lgp.robots.inverse.general import InverseKinematics, inverse_kinematics
+from guided_lgp.robots.inverse.offset_shoulder import OffsetShoulder
+
+__all__ = ["InverseKinematics", "OffsetShoulder", "inverse_kinematics"]

@@ -1,0 +1,1 @@
+"""What a robot's description says without words: levers, spheres, hands, mirror images, pairs."""
