@@ -42,3 +42,15 @@ def test_a_table_out_of_reach_is_named_before_any_search() -> None:
     assert (result.solved, result.reason) == (False, "impossible")
     assert result.explanation == "far is out of reach of both arms"
     assert (result.tree_size, result.coarse_calls) == (1, 0)
+
+
+def test_a_goal_that_needs_a_hand_over_gets_one() -> None:
+    """One arm reaches the box, the other its place: what the paper's instructions cannot do."""
+    case = CASES / "handover_only.json"
+    result = plan(case, "(on parcel farright)", timeout=300)
+    assert result.skeleton is not None, result.explanation
+    assert [action.instruction for action in result.skeleton] == ["grasp", "take", "place"]
+    assert result.scene.domain == "handover"
+    refused = plan(case, "(on parcel farright)", domain="pick_and_place", timeout=300)
+    assert not refused.solved
+    assert refused.scene.domain == "pick_and_place"

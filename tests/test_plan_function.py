@@ -119,6 +119,7 @@ def test_impossible_tasks_name_the_action_the_constraint_and_the_amount(
 
 def test_attempts_that_go_in_circles_are_told_apart_from_infeasible_ones() -> None:
     result = PlanningResult(
+        scene=load_scene(EXAMPLES / "three_boxes.json"),
         coarse=None,
         path=None,
         tree_size=30,

@@ -3,11 +3,14 @@
 import logging
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
+from guided_lgp.bounds.deadline import Deadline
 from guided_lgp.bounds.results import PathResult
 from guided_lgp.bounds.scene_bounds import SceneBounds
+from guided_lgp.domains import load_domain
 from guided_lgp.errors import InputError
 from guided_lgp.explanation import ObservedBounds, Obstacle
 from guided_lgp.logic import (
@@ -18,7 +21,7 @@ from guided_lgp.logic import (
     satisfied,
     validate_objective,
 )
-from guided_lgp.params import PlanningParams, SearchLimits, load_planning
+from guided_lgp.params import BoundsParams, PlanningParams, SearchLimits, load_planning
 from guided_lgp.paths import MODELS
 from guided_lgp.policy.registry import POLICIES, load_policy, missing_instructions
 from guided_lgp.scene import Scene, load_scene
@@ -34,6 +37,7 @@ from guided_lgp.search.planners import (
 from guided_lgp.search.policy import Policy, Uniform
 from guided_lgp.search.problem import Problem
 from guided_lgp.search.result import REASONS, Cause, SearchResult, Times
+from guided_lgp.search.ways import widened_scene
 
 DEFAULT_POLICY = "relational"
 
@@ -54,6 +58,8 @@ _OUTCOMES: Mapping[Cause, str] = {
 class PlanningResult(SearchResult):
     """The plan found, or why there is none, and what the search cost."""
 
+    scene: Scene
+    """As planned in: with the domain whose instructions were used."""
     solver_starts: int
     """Starts of the coarse bound's solver, over all sequences."""
     obstacles: tuple[Obstacle, ...] = ()
@@ -92,6 +98,7 @@ def plan(
     params: PlanningParams | None = None,
     max_nodes: int | None = None,
     timeout: float | None = None,
+    domain: str | None = None,
     where: str = "scene",
 ) -> PlanningResult:
     """Find a sequence of actions and its motion such that all goals hold at the end.
@@ -108,6 +115,8 @@ def plan(
         max_nodes: nodes of the search tree at which the search ends, instead of the limit in
             ``params``.
         timeout: seconds of wall clock after which the search ends.
+        domain: whose instructions the plan may have. By default that of the scene; where the scene
+            names none, the paper's, or one that extends it if facts show that a goal needs it.
         where: the scene's file, for messages.
 
     Returns:
@@ -122,24 +131,57 @@ def plan(
         raise InputError("planner", f"unknown {planner!r}", ", ".join(SEARCHES))
     if not isinstance(scene, Scene):
         scene, where = load_scene(scene), str(scene)
+    chosen = domain is not None or "domain" in scene.model_fields_set
+    if domain is not None:
+        scene = scene.model_copy(update={"domain": load_domain(domain).name})
     goals = parse_objective([objective] if isinstance(objective, str) else map(str, objective))
     validate_scene(scene, where)
     if goals and satisfied(scene.state, goals):
-        return _without_search(PathResult((), feasible=True))
+        return _without_search(scene, PathResult((), feasible=True))
     validate_objective(goals, scene.symbols, scene.state)
     params = params or load_planning()
-    limits = _limits(params.compare_scalability, scene, goals, max_nodes)
-    scene_bounds = SceneBounds(scene, params.bounds)
+    deadline = Deadline.after(timeout)
+    scene_bounds = SceneBounds(scene, params.bounds, deadline)
     if fact := out_of_reach(scene, scene_bounds.facts, goals):
-        return _without_search(None, fact)
-    bounds = ObservedBounds(scene_bounds)
+        return _without_search(scene, None, fact)
+    limits = _limits(params.compare_scalability, scene, goals, max_nodes)
     search, followed = _guidance(planner, policy, models, scene)
-    result = search.plan(Problem(scene, goals, limits, bounds, followed, max_seconds=timeout))
-    return PlanningResult(
-        **vars(result),
-        solver_starts=bounds.starts,
-        obstacles=() if result.solved else bounds.obstacles(scene.state, goals),
-    )
+    observed = ObservedBounds(scene_bounds)
+    attempts = _Attempts(Problem(scene, goals, limits, observed, followed, deadline=deadline))
+    if chosen:
+        return attempts.result(search.plan(attempts.first))
+    widened = partial(attempts.widened, params.bounds)
+    return attempts.result(search.plan(replace(attempts.first, widened=widened)))
+
+
+class _Attempts:
+    """A problem, and the same with further instructions where a search has asked for them."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.first = self._last = problem
+
+    def widened(self, params: BoundsParams) -> Problem | None:
+        """The problem with further instructions, if a goal needs them; no policy knows these."""
+        problem = self.first
+        scene = widened_scene(problem.scene, problem.objective, params, problem.deadline)
+        if scene is None:
+            return None
+        bounds = ObservedBounds(SceneBounds(scene, params, problem.deadline))
+        self._last = replace(problem, scene=scene, bounds=bounds, policy=Uniform())
+        return self._last
+
+    def result(self, found: SearchResult) -> PlanningResult:
+        """What the searches have found, with what stopped the sequences of the last one."""
+        problem, bounds = self._last, self._last.bounds
+        assert isinstance(bounds, ObservedBounds)
+        return PlanningResult(
+            **vars(found),
+            scene=problem.scene,
+            solver_starts=bounds.starts,
+            obstacles=()
+            if found.solved
+            else bounds.obstacles(problem.scene.state, problem.objective),
+        )
 
 
 def _guidance(
@@ -179,9 +221,12 @@ def _limits(
     return limits.model_copy(update=changed)
 
 
-def _without_search(path: PathResult | None, fact: str | None = None) -> PlanningResult:
+def _without_search(
+    scene: Scene, path: PathResult | None, fact: str | None = None
+) -> PlanningResult:
     """The result where nothing has to be done, or nothing can be."""
     return PlanningResult(
+        scene=scene,
         coarse=None,
         path=path,
         tree_size=1,

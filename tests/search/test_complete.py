@@ -2,6 +2,7 @@
 
 from scripted import UNIFORM, Scorer, ScriptedBounds
 
+from guided_lgp.bounds.deadline import Deadline
 from guided_lgp.logic import parse_objective, progress, satisfied
 from guided_lgp.params import SearchLimits
 from guided_lgp.scene.model import Scene
@@ -43,5 +44,7 @@ def test_what_is_infeasible_is_exhausted(scene: Scene, limits: SearchLimits) -> 
 
 def test_the_limit_of_time_ends_it(scene: Scene, limits: SearchLimits) -> None:
     bounds = ScriptedBounds(scene)
-    result = complete.plan(Problem(scene, OBJECTIVE, limits, bounds, CIRCLES, max_seconds=1e-9))
+    result = complete.plan(
+        Problem(scene, OBJECTIVE, limits, bounds, CIRCLES, deadline=Deadline.after(0))
+    )
     assert (result.reason, bounds.coarse_asked) == ("max_seconds", [])

@@ -4,6 +4,7 @@ from functools import cached_property
 
 from guided_lgp.bounds.coarse import CoarseBound, check_terms
 from guided_lgp.bounds.coarse.facts import Facts
+from guided_lgp.bounds.deadline import NEVER, Deadline
 from guided_lgp.bounds.path import PathBound, check_motions
 from guided_lgp.bounds.results import CoarseResult, PathResult
 from guided_lgp.logic import Skeleton
@@ -16,15 +17,17 @@ class SceneBounds:
 
     The coarse bound of a skeleton starts from its prefix, and a skeleton with an infeasible prefix
     is infeasible: its constraints contain those of the prefix. So a verdict depends only on the
-    scene and the skeleton, whoever asks first, and planners may share one instance.
+    scene and the skeleton, whoever asks first, and planners may share one instance. After the
+    deadline there are no more verdicts, but an ``OutOfTimeError``.
     """
 
-    def __init__(self, scene: Scene, params: BoundsParams) -> None:
+    def __init__(self, scene: Scene, params: BoundsParams, deadline: Deadline = NEVER) -> None:
         check_terms(scene.symbols.domain)
         check_motions(scene.symbols.domain)
         self.scene = scene
-        self._coarse_bound = CoarseBound(scene, params.coarse_tries)
+        self._coarse_bound = CoarseBound(scene, params.coarse_tries, deadline=deadline)
         self._path_solutions = params.path_solutions
+        self._deadline = deadline
         self._coarse: dict[Skeleton, CoarseResult] = {}
         self._path: dict[Skeleton, PathResult] = {}
 
@@ -60,4 +63,4 @@ class SceneBounds:
     @cached_property
     def _path_bound(self) -> PathBound:
         """Built when first asked: most skeletons never get so far."""
-        return PathBound(self.scene, self._coarse_bound, self._path_solutions)
+        return PathBound(self.scene, self._coarse_bound, self._path_solutions, self._deadline)

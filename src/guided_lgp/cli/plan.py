@@ -12,6 +12,7 @@ from guided_lgp import __version__
 from guided_lgp.cli.outputs import destinations
 from guided_lgp.cli.terminal import AsJson, is_plan, one_of, show, spinner
 from guided_lgp.documents import STANDARD_OUTPUT
+from guided_lgp.domains import domain_names
 from guided_lgp.errors import InputError
 from guided_lgp.paths import MODELS, PLANNING
 from guided_lgp.policy.registry import POLICIES
@@ -62,6 +63,15 @@ def plan(
             + ".",
         ),
     ] = "relational",
+    domain: Annotated[
+        str | None,
+        typer.Option(
+            parser=one_of(domain_names()),
+            metavar=f"[{'|'.join(domain_names())}]",
+            help="Whose instructions the plan may have.",
+            show_default="that of SCENE; or else the paper's, and more where a goal needs them",
+        ),
+    ] = None,
     max_nodes: Annotated[
         int | None,
         typer.Option(
@@ -157,6 +167,7 @@ def plan(
             params=load_planning(params),
             max_nodes=max_nodes,
             timeout=timeout,
+            domain=domain,
             where=str(scene),
         )
     followed = SEARCHES[planner].follows_policy
@@ -166,6 +177,7 @@ def plan(
         "policy": policy if followed else None,
         "weights": _origin(models, MODELS) if followed else None,
         "limits": _origin(params, PLANNING),
+        "domain": result.scene.domain,
         "tree_size": result.tree_size,
         "attempts": 1 + sum(result.reattempts.values()),
         "coarse_sequences": result.coarse_calls,
@@ -200,17 +212,17 @@ def plan(
         from guided_lgp.bounds.execution import execute as simulate
 
         with spinner("executing"):
-            physics = asdict(simulate(start, objective, path.skeleton, path.trajectory))
+            physics = asdict(simulate(result.scene, objective, path.skeleton, path.trajectory))
         summary["physics"] = physics
     if plan_file := files["--out"]:
         from guided_lgp.bounds.plan_file import write_plan
 
-        write_plan(plan_file, start, objective, path, statistics, physics)
+        write_plan(plan_file, result.scene, objective, path, statistics, physics)
     if page := files["--html"]:
         from guided_lgp.view.replay import replay_html
 
         with spinner("writing the replay"):
-            replay_html(path.trajectory, start, page, path.skeleton, objective)
+            replay_html(path.trajectory, result.scene, page, path.skeleton, objective)
     if as_json:
         typer.echo(json.dumps(summary, indent=1))
         return

@@ -17,6 +17,16 @@ def domain_names() -> tuple[str, ...]:
 
 
 @cache
+def extensions(name: str) -> tuple[str, ...]:
+    """The domains that extend one, sorted."""
+    return tuple(
+        other
+        for other in domain_names()
+        if (base := load_domain(other).extends) is not None and base.name == name
+    )
+
+
+@cache
 def load_domain(name: str = PAPER) -> Domain:
     """The domain that the file of this name declares as ``DOMAIN``.
 

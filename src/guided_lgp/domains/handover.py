@@ -32,4 +32,5 @@ DOMAIN = Domain(
     types=PICK_AND_PLACE.types,
     instructions=(*PICK_AND_PLACE.instructions, take),
     goal_types=PICK_AND_PLACE.goal_types,
+    extends=PICK_AND_PLACE,
 )

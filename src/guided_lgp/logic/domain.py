@@ -71,6 +71,8 @@ class Domain:
     instructions: tuple[Instruction, ...]
     goal_types: tuple[GoalType, ...]
     facts: tuple[FactType, ...] = ()
+    extends: "Domain | None" = None
+    """The domain to which this one adds instructions, for goals that need them."""
 
     def __post_init__(self) -> None:
         check_declarations(self)

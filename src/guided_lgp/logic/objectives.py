@@ -78,13 +78,13 @@ def _changes_of_parent(symbols: Symbols, body: str, wanted: frozenset[str]) -> M
         for one in moves:
             if one.parent == parent:
                 for before in symbols.names:
-                    if before not in steps and _may_leave(before, one.precondition, body, symbols):
+                    if before not in steps and may_leave(before, one.precondition, body, symbols):
                         steps[before] = steps[parent] + 1
                         queue.append(before)
     return steps
 
 
-def _may_leave(
+def may_leave(
     parent: str, precondition: tuple[GroundAtom, ...], body: str, symbols: Symbols
 ) -> bool:
     """Whether the body may hang on a parent, by what a precondition says of the two."""

@@ -56,6 +56,15 @@ def check_declarations(domain: "Domain") -> None:
         _check_atoms(f"{field}, condition", goal_type.condition, goal_type, domain, refuse)
         if not goal_type.condition:
             raise refuse(f"{field}, condition", "is empty", "one or more atoms")
+    if domain.extends is not None:
+        _check_names_kept(domain, domain.extends, refuse)
+
+
+def _check_names_kept(domain: "Domain", base: "Domain", refuse: Refuse) -> None:
+    for field in ("types", "instructions", "goal_types", "facts"):
+        for one in getattr(base, field):
+            if one not in getattr(domain, field):
+                raise refuse("extends", f"{one.name} of {base.name} is missing", f"all its {field}")
 
 
 def _check_types(types: Sequence[Type], refuse: Refuse) -> None:

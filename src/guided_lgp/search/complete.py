@@ -4,7 +4,7 @@ from guided_lgp.logic import least_actions
 from guided_lgp.search import best_first, guided
 from guided_lgp.search.estimates import PolicyEstimate
 from guided_lgp.search.problem import Problem
-from guided_lgp.search.result import SearchResult
+from guided_lgp.search.result import SearchResult, joined
 from guided_lgp.search.skeleton_tree import SkeletonTree
 
 
@@ -12,12 +12,15 @@ def plan(problem: Problem) -> SearchResult:
     """Follow the policy greedily; where that fails, search best-first with what is known by then.
 
     An attempt of the policy that takes twice the least number of actions goes in circles and ends.
+    Where a goal needs further instructions, the second search has them.
     Complete up to ``limits.max_depth``, unless another limit ends the search before.
     """
     tree = SkeletonTree(problem)
     least = least_actions(problem.scene.state, problem.objective, problem.symbols)
     depth = min(2 * least + 2, problem.limits.max_depth)
     result = guided.search(tree, int(depth))
-    if result.reason in ("attempts", "exhausted"):  # within the depth of an attempt
-        return best_first.search(tree, PolicyEstimate(problem))
-    return result
+    if result.reason not in ("attempts", "exhausted"):  # within the depth of an attempt
+        return result
+    if (wider := problem.widened()) is not None:
+        return joined(result, best_first.plan(wider))
+    return best_first.search(tree, PolicyEstimate(problem))

@@ -1,7 +1,9 @@
 """What a planner is given."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
+from guided_lgp.bounds.deadline import NEVER, Deadline
 from guided_lgp.logic import Objective, Symbols, validate_objective
 from guided_lgp.params import SearchLimits
 from guided_lgp.scene import Scene
@@ -28,8 +30,10 @@ class Problem:
     restriction: Symbols | None = None
     """The symbols that actions may name, if not all of the scene."""
 
-    max_seconds: float | None = None
-    """Wall clock, for users; experiments have none, so that their results are the same anywhere."""
+    deadline: Deadline = NEVER
+    """When the search ends, for users."""
+    widened: Callable[[], "Problem | None"] = lambda: None
+    """The same task with further instructions, if one of its goals needs them."""
 
     def __post_init__(self) -> None:
         validate_objective(self.objective, self.symbols, self.scene.state)

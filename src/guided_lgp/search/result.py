@@ -1,13 +1,17 @@
 """What a planner returns, and the bookkeeping that all planners share."""
 
 import time
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Literal
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import astuple, dataclass, replace
+from typing import Literal, TypeVar
 
+from guided_lgp.bounds.deadline import OutOfTimeError
 from guided_lgp.bounds.results import Array, CoarseResult, Failure, PathResult
 from guided_lgp.logic import Action, Objective, Skeleton, State, Symbols, format_skeleton
 from guided_lgp.search.problem import Problem
+
+Verdict = TypeVar("Verdict", CoarseResult, PathResult)
 
 Cause = Literal["infeasible", "max_depth", "max_seconds"]
 """Why an attempt of the guided search ended; the first two as in the paper (Table I)."""
@@ -93,6 +97,17 @@ class SearchResult:
         return f"{line}; last sequence tried: {format_skeleton(self.failed)}: {self.failure}"
 
 
+def joined(first: SearchResult, second: SearchResult) -> SearchResult:
+    """The second of two searches for one task, at the cost of both."""
+    times = (a + b for a, b in zip(astuple(first.times), astuple(second.times), strict=True))
+    both = {name: getattr(first, name) + getattr(second, name) for name in _COUNTS}
+    both["reattempts"] = Counter(first.reattempts) + Counter(second.reattempts)
+    return replace(second, **both, times=Times(*times))
+
+
+_COUNTS = ("tree_size", "expansions", "policy_calls", "coarse_calls", "path_calls", "causes")
+
+
 class Run:
     """One run of a planner: the bounds and the policy as it sees them, with their cost."""
 
@@ -100,7 +115,8 @@ class Run:
         self._bounds = problem.bounds
         self._policy = problem.policy
         self._limits = problem.limits
-        self._allowed_s = problem.max_seconds
+        self._deadline = problem.deadline
+        self._cut_off = False
         self._start = time.perf_counter()
         self._waited = 0.0
         self._policy_s = self._coarse_s = self._path_s = 0.0
@@ -123,7 +139,8 @@ class Run:
         for length in range(1, len(skeleton) + 1):
             result = self._verdict(skeleton[:length])
             if not result.feasible:
-                self._failure, self.failed = result.failure, result.skeleton
+                if not self._cut_off:
+                    self._failure, self.failed = result.failure, result.skeleton
                 break
         return result
 
@@ -131,7 +148,9 @@ class Run:
         result = self._asked.get(skeleton)
         if result is None:
             start = time.perf_counter()
-            result = self._asked[skeleton] = self._bounds.coarse(skeleton)
+            result = self._asked[skeleton] = self._in_time(
+                self._bounds.coarse, CoarseResult(skeleton, feasible=False, restarts=0)
+            )
             self._waited += time.perf_counter() - start
             self._coarse_s += result.time_s
         return result
@@ -142,15 +161,23 @@ class Run:
         if not coarse.feasible:
             return False
         start = time.perf_counter()
-        path = self._bounds.path(skeleton)
+        path = self._in_time(self._bounds.path, PathResult(skeleton, feasible=False))
         self._waited += time.perf_counter() - start
         self._path_s += path.time_s
         self._path_calls += 1
         if path.feasible:
             self.solution = coarse, path
-        else:
+        elif not self._cut_off:
             self._failure, self.failed = path.failure, skeleton
         return path.feasible
+
+    def _in_time(self, bound: Callable[[Skeleton], Verdict], otherwise: Verdict) -> Verdict:
+        """The verdict of a bound, or another one where the time is up."""
+        try:
+            return bound(otherwise.skeleton)
+        except OutOfTimeError:
+            self._cut_off = True
+            return otherwise
 
     def log_probabilities(
         self,
@@ -173,8 +200,7 @@ class Run:
     @property
     def expired(self) -> bool:
         """Whether the time is up."""
-        allowed = self._allowed_s
-        return allowed is not None and time.perf_counter() - self._start >= allowed
+        return self._cut_off or self._deadline.passed
 
     def limit_reached(self, tree_size: int) -> Limit | None:
         """The limit that ends the search, if one is reached."""
@@ -193,6 +219,8 @@ class Run:
 
     def result(self, tree_size: int, reason: Reason | None = None) -> SearchResult:
         """The result of the run: solved, or ended for a reason."""
+        if reason is not None and self._cut_off:
+            reason = "max_seconds"
         followed = self._causes if reason is None else self._causes[:-1]
         causes: tuple[Cause, ...] = ("infeasible", "max_depth")
         coarse, path = self.solution or (None, None)

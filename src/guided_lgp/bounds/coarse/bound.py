@@ -12,6 +12,7 @@ from guided_lgp.bounds.coarse.facts import Facts
 from guided_lgp.bounds.coarse.formulation import Formulation, Formulator
 from guided_lgp.bounds.coarse.solver import Settings, Solution, Solver, default_solver
 from guided_lgp.bounds.coarse.starts import Starts
+from guided_lgp.bounds.deadline import NEVER, Deadline
 from guided_lgp.bounds.program.geometry import Margins, SceneGeometry
 from guided_lgp.bounds.results import Array, CoarseResult, Failure
 from guided_lgp.bounds.terms.term import UngraspableError
@@ -36,10 +37,17 @@ class CoarseBound:
     infeasible; otherwise the first start continues the solution of the prefix.
     """
 
-    def __init__(self, scene: Scene, restarts: int, solver: Solver | None = None) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        restarts: int,
+        solver: Solver | None = None,
+        deadline: Deadline = NEVER,
+    ) -> None:
         """Prepare a scene; ``restarts`` is the number of starts before giving up."""
         self.scene = scene
         self._restarts = restarts
+        self._deadline = deadline
         self._solver = solver or default_solver(scene.robot.description)
         self._geometry = SceneGeometry(scene)
         self.facts = Facts(self._geometry)
@@ -57,6 +65,7 @@ class CoarseBound:
 
         Raises:
             ValueError: the prefix is the result for another skeleton.
+            OutOfTimeError: the deadline has passed.
         """
         started = time.perf_counter()
         if prefix is not None and prefix.skeleton != skeleton[:-1]:
@@ -112,6 +121,7 @@ class CoarseBound:
         self, programs: "_Programs", number: int, prefix: CoarseSolution | None
     ) -> CoarseSolution:
         """One start: the first and every other one keep the solution of the prefix."""
+        self._deadline.check()
         formulation = programs[number]
         warm_start = None if prefix is None else prefix.values
         start = self._starts.draw(

@@ -4,6 +4,7 @@ import time
 from itertools import chain, islice
 
 from guided_lgp.bounds.coarse import CoarseBound
+from guided_lgp.bounds.deadline import NEVER, Deadline
 from guided_lgp.bounds.path.assembly import assemble
 from guided_lgp.bounds.path.grips import grips_of
 from guided_lgp.bounds.path.motions import Mover
@@ -32,18 +33,21 @@ class PathBound:
     sends the search back to the one that it depends on, and in the end to another coarse solution.
     """
 
-    def __init__(self, scene: Scene, coarse: CoarseBound, solutions: int) -> None:
+    def __init__(
+        self, scene: Scene, coarse: CoarseBound, solutions: int, deadline: Deadline = NEVER
+    ) -> None:
         """Prepare for one scene.
 
         Args:
             scene: the initial configuration.
             coarse: gives further coarse solutions.
             solutions: largest number of coarse solutions to try.
+            deadline: after which it gives up.
         """
         self._scene = scene
         self._coarse = coarse
         self._solutions = solutions
-        self._mover = Mover(scene, _ITERATIONS)
+        self._mover = Mover(scene, _ITERATIONS, deadline)
         self._grips = {
             (gripper, box.name): grips_of(box, arm)
             for gripper, arm in self._mover.robot.arms.items()
@@ -59,6 +63,9 @@ class PathBound:
 
         Returns:
             The motion, or a failure that names the action and the obstacle met farthest on.
+
+        Raises:
+            OutOfTimeError: the deadline has passed.
         """
         began = time.perf_counter()
         skeleton = coarse_result.skeleton

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from guided_lgp.bounds.checks import body_names, overlap_name
+from guided_lgp.bounds.deadline import NEVER, Deadline
 from guided_lgp.bounds.path.collision import CollisionChecker, PlanningScene
 from guided_lgp.bounds.path.connect import connect, shortcut
 from guided_lgp.bounds.path.spaces import (
@@ -89,7 +90,7 @@ class Motion:
 class Mover:
     """Plans motions in one scene. Deterministic: every call brings its source of randomness."""
 
-    def __init__(self, scene: Scene, iterations: int) -> None:
+    def __init__(self, scene: Scene, iterations: int, deadline: Deadline = NEVER) -> None:
         base, fixed = scene.robot.base_pose, scene.robot.fixed_values
         self.robot = scene.robot.description
         self.arms = {g: PlacedArm(self.robot, g, base, fixed) for g in self.robot.grippers}
@@ -97,6 +98,7 @@ class Mover:
         self._checker = CollisionChecker(scene)
         self._entered: tuple[Surroundings, JointSpace] | None = None
         self._iterations = iterations
+        self._deadline = deadline
 
     def name_of(self, pair: tuple[str, str]) -> str:
         """The constraint that two bodies in collision violate."""
@@ -205,6 +207,7 @@ class Mover:
 
     def _space(self, surroundings: Surroundings) -> JointSpace:
         """The space of a motion; the checker is there already if it was the last one asked for."""
+        self._deadline.check()
         if self._entered is None or self._entered[0] is not surroundings:
             self._checker.enter(surroundings.scene)
             arm = self.arms[surroundings.scene.gripper]
