@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from guided_lgp import plan
+from guided_lgp.errors import InputError
 from guided_lgp.logic import progress, satisfied
 from guided_lgp.logic.objectives import parse_objective
 from guided_lgp.scene import load_scene
@@ -25,6 +26,11 @@ ELEVEN = [f"(on b{number} right)" for number in range(1, 12)]
         ("into_shelf_24cm", ["(on red board)"], 2),
         ("into_shelf_45cm", ["(on red board)"], 2),
         ("out_of_shelf_24cm", ["(on red left)"], 2),
+        # What no goal needs may stand near an edge, or be too wide for the hand.
+        ("edge_3mm", ["(on green left)"], 2),
+        ("ungraspable_bystander", ["(on red right)"], 2),
+        # Names of the usual sets of objects.
+        ("ycb_name", ["(on 003_cracker_box right)"], 2),
         # More actions than the paper's limit of depth.
         ("twelve", ELEVEN, 22),
     ],
@@ -35,6 +41,21 @@ def test_the_default_planner_finds_a_plan(name: str, goals: list[str], least: in
     assert result.skeleton is not None, result.explanation
     assert satisfied(progress(scene.state, result.skeleton), parse_objective(goals))
     assert least <= len(result.skeleton) <= least + 2
+
+
+@pytest.mark.parametrize(
+    ("name", "fault"),
+    [
+        # What does not stand is told before any planning, as bad input.
+        ("tipping_stack", r"boxes\.1 \(b\)\.position: the box cannot stand: .* beside a"),
+        # Another unit is suspected in words.
+        ("millimetres", r"tables\.0\.position\.0: 540 is too large: lengths are in m; .* mm"),
+    ],
+)
+def test_a_faulty_scene_is_refused_in_one_line(name: str, fault: str) -> None:
+    with pytest.raises(InputError, match=fault) as error:
+        plan(CASES / f"{name}.json", "(on red right)")
+    assert len(str(error.value).splitlines()) == 1
 
 
 def test_a_table_out_of_reach_is_named_before_any_search() -> None:

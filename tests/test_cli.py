@@ -137,7 +137,7 @@ def test_contradictory_goals(capsys: pytest.CaptureFixture[str]) -> None:
     ("changes", "message"),
     [
         ({"boxes": []}, "boxes"),
-        ({"colour": "blue"}, "colour"),
+        ({"colour": "blue"}, "unknown field 'colour'"),
         ({"robot": {"model": "pr2", "torso": 2}}, "robot.torso"),
         ({"tables": [{"name": "tab1", "position": [0, 0], "half_extents": [1, 1]}]}, "tables.0"),
     ],

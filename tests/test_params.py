@@ -56,12 +56,12 @@ def test_each_seed_is_another_one() -> None:
 @pytest.mark.parametrize(
     ("section", "key", "value", "expected"),
     [
-        ("build_dataset", "training_objectives", 73, "input should be less than or equal to 72"),
-        ("build_dataset", "training_objectives", 0, "input should be greater than or equal to 1"),
-        ("build_dataset", "seed", "five", "input should be a valid integer"),
-        ("generate_scenes", "training_configurations", 2.5, "input should be a valid integer"),
-        ("train_policy", "validation_share", float("nan"), "input should be less than 1"),
-        ("parallel", "backend", "threads", "input should be 'loky' or 'dask'"),
+        ("build_dataset", "training_objectives", 73, "73 is more than 72"),
+        ("build_dataset", "training_objectives", 0, "0 is less than 1"),
+        ("build_dataset", "seed", "five", "'five' is not a whole number"),
+        ("generate_scenes", "training_configurations", 2.5, "2.5 is not a whole number"),
+        ("train_policy", "validation_share", float("nan"), "nan is not less than 1"),
+        ("parallel", "backend", "threads", "'threads' is not 'loky' or 'dask'"),
     ],
 )
 def test_impossible_values(
@@ -69,17 +69,13 @@ def test_impossible_values(
 ) -> None:
     content = document()
     content[section][key] = value
-    text = message(tmp_path, content)
-    assert text.startswith(f"{section}.{key}: {expected}")
-    assert text.endswith(f"not {value!r}")
+    assert message(tmp_path, content) == f"{section}.{key}: {expected}"
 
 
 def test_nested_values(tmp_path: Path) -> None:
     content = document()
     content["train_policy"]["place"]["dropout"] = 1.0
-    assert message(tmp_path, content) == (
-        "train_policy.place.dropout: input should be less than 1, not 1.0"
-    )
+    assert message(tmp_path, content) == ("train_policy.place.dropout: 1.0 is not less than 1")
 
 
 def test_unknown_keys_name_the_accepted_ones(tmp_path: Path) -> None:

@@ -24,7 +24,7 @@ ROOT = Path(__file__).parents[1]
 PARAMS = load_params(ROOT / "params.yaml")
 INFRASTRUCTURE = {"guided_lgp"} | {
     f"guided_lgp.{name}"
-    for name in ("cache", "documents", "errors", "parallel", "params", "paths", "tables")
+    for name in ("cache", "documents", "errors", "faults", "parallel", "params", "paths", "tables")
 }
 """Modules that do not determine a stage's results: fan-out, messages, places."""
 UNUSED = {

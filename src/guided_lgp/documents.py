@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from pydantic import ValidationError
 
 from guided_lgp.errors import InputError
 
@@ -158,14 +157,6 @@ class _Loader(yaml.SafeLoader):
 
 _Loader.add_constructor("tag:yaml.org,2002:int", _Loader.construct_yaml_int)
 _Loader.add_constructor("tag:yaml.org,2002:str", _Loader.construct_yaml_str)
-
-
-def first_fault(error: ValidationError, where: str) -> InputError:
-    """The first fault that pydantic found in a document, in one line with its field."""
-    first = error.errors()[0]
-    field = ".".join(str(part) for part in first["loc"])
-    message = first["msg"].removeprefix("Value error, ")  # what our own validators say
-    return InputError(f"{where}: {field}" if field else where, message)
 
 
 def write_json(path: Path, document: Any) -> None:

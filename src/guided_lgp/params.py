@@ -1,6 +1,5 @@
 """The parameters of the pipeline: the model that validates ``params.yaml``."""
 
-import reprlib
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin
 
@@ -9,6 +8,7 @@ from pydantic_core import PydanticCustomError
 
 from guided_lgp.documents import read_yaml
 from guided_lgp.errors import InputError
+from guided_lgp.faults import words
 from guided_lgp.paths import PARAMS, PLANNING
 
 
@@ -235,15 +235,7 @@ def _input_error(path: Path, error: ValidationError, model: type[BaseModel]) -> 
             return InputError(where, "missing")
         case "model_type":
             return InputError(where, "is not a mapping", ", ".join(_accepted_keys(model, keys)))
-    return InputError(where, f"{first['msg'].lower()}, not {_brief(first['input'])}")
-
-
-def _brief(value: object) -> str:
-    """The value as text of bounded length: aliases make small files of huge values."""
-    try:
-        return reprlib.repr(value)
-    except ValueError:  # Python does not write out integers of more than 4300 digits
-        return "a number of thousands of digits"
+    return InputError(where, words(first))
 
 
 def _accepted_keys(model: type[BaseModel], section: list[str]) -> list[str]:

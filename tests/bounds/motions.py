@@ -5,12 +5,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pinocchio
 
+from grasp_poses import grasp_poses
 from guided_lgp.bounds.results import Array, Attachment, Keyframe, Trajectory
 from guided_lgp.poses import compose, inverse, pose
 from guided_lgp.robots import load_robot
 from guided_lgp.robots.kinematics import fill
 from guided_lgp.scene import Box, Scene, Table
-from guided_lgp.scene.reach import grasp_poses
 from guided_lgp.scene.world import World, initial_poses
 
 SIZE = (0.15, 0.07, 0.10)

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from motions import CLOSED, PALM_FRONT, PR2, Motion, from_above, grasp, place, reach, scene, shifted
 
+from grasp_poses import grasp_poses
 from guided_lgp.bounds.execution import execute
 from guided_lgp.bounds.results import Trajectory
 from guided_lgp.logic import parse_objective, parse_skeleton
 from guided_lgp.poses import compose, pose
 from guided_lgp.scene import Scene
-from guided_lgp.scene.reach import grasp_poses
 
 STACK = parse_skeleton("(grasp pr2L red) (place pr2L red green)")
 STACKED = parse_objective(["(on red green)", "(on green tab1)"])

@@ -131,7 +131,7 @@ def _drop_keyframes(plan: dict[str, Any]) -> None:
         (_text_for_number, "path.times.0"),
         (_unknown_joint, "joint_names"),
         (_repeat_joint, "joint_names"),
-        (_last_for_ever, r"path.times.\d+: .* less than"),
+        (_last_for_ever, r"path.times.\d+: .* is more than"),
         (_drop_scene, "scene"),
         (_drop_keyframes, "0 keyframes"),
     ],

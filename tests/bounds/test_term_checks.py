@@ -15,6 +15,7 @@ from guided_lgp.bounds.terms import balanced, carried, hold, kernel_table, pads,
 from guided_lgp.poses import compose, pose, quaternion
 from guided_lgp.scene import Box, PlacedRobot, Scene, Table
 from guided_lgp.scene.footprints import footprint, gap
+from guided_lgp.scene.tolerances import BALANCE_INSET
 from guided_lgp.scene.world import World
 
 PLACED = PlacedRobot(base=(0.0, 0.0, 0.0))
@@ -103,7 +104,7 @@ def test_balanced() -> None:
         unused = balanced.STACK - len(sizes)
         x = np.array([*support, *points.ravel(), *np.zeros(2 * unused)])
         shares = [*(masses / masses.sum()), *np.zeros(unused)]
-        rows = residual("balanced", x, np.array([*(half - balanced.BALANCE_INSET), *shares]))
+        rows = residual("balanced", x, np.array([*(half - BALANCE_INSET), *shares]))
         boxes = {n: pose((*p, 0.7)).tolist() for n, p in zip(sizes, points, strict=True)}
         on = {"red": "tab", "green": "red", "blue": "red"}
         top = Top(pose((*support[:2], 0.6), support[2]).tolist(), half, 0.6)

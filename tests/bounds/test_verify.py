@@ -22,6 +22,7 @@ from motions import (
     with_arm,
 )
 
+from grasp_poses import grasp_poses
 from guided_lgp.bounds.results import Array, Keyframe, Trajectory
 from guided_lgp.bounds.verify import verify_keyframe, verify_keyframes, verify_path
 from guided_lgp.bounds.verify.phase import STEP, resample
@@ -29,7 +30,6 @@ from guided_lgp.domains import load_domain
 from guided_lgp.logic import Action, State, parse_skeleton
 from guided_lgp.poses import apply, compose, inverse, multiply, pose
 from guided_lgp.scene import Scene
-from guided_lgp.scene.reach import grasp_poses
 from guided_lgp.scene.world import World
 
 HOME = PR2.home

@@ -35,7 +35,7 @@ def test_a_description_of_ones_own_is_read(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("keys", "value", "fault"),
     [
-        (("arms", "hand", "tool"), None, r"arms\.hand\.tool: Field required"),
+        (("arms", "hand", "tool"), None, r"arms\.hand\.tool: is missing"),
         (("arms", "hand", "tool", "link"), "pam", r"tool\.link: unknown link pam .accepted: palm"),
         (("arms", "hand", "tool", "closing"), "-z", r"tool\.closing: -z is along the approach"),
         (("arms", "hand", "joints", 2), "join3", r"joints: join3 is no joint .*accepted: joint3"),
@@ -56,8 +56,8 @@ def test_a_description_of_ones_own_is_read(folder: Path) -> None:
             {"lift": {"joint": "lift", "limits": [0, 1], "default": 0}},
             "lift is no",
         ),
-        (("arms",), {}, r"arms: Dictionary should have at least 1 item"),
-        (("legs",), 2, r"legs: Extra inputs"),
+        (("arms",), {}, r"arms: has 0 values, fewer than 1"),
+        (("legs",), 2, r"own\.yaml: unknown field 'legs' .known: description, .*arms"),
     ],
 )
 def test_a_fault_is_named_in_one_line(

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from grasp_poses import grasp_poses
 from guided_lgp.errors import InputError
 from guided_lgp.poses import (
     Array,
@@ -21,7 +22,6 @@ from guided_lgp.poses import (
 )
 from guided_lgp.robots import load_robot
 from guided_lgp.scene import Scene, Table, generate
-from guided_lgp.scene.reach import grasp_poses
 from guided_lgp.scene.world import World
 
 PR2 = load_robot("pr2")

@@ -80,8 +80,8 @@ def test_the_document_names_the_height_only_of_a_raised_robot() -> None:
     [
         ({"model": "r2d2"}, "unknown robot 'r2d2' .*panda, pr2"),
         ({"model": "missing.yaml"}, "missing.yaml: No such file"),
-        ({"torso": 0.2}, "unknown field 'torso' .model, base, height."),
-        ({"height": -0.1}, "robot.height: Input should be greater than or equal to 0"),
+        ({"torso": 0.2}, "unknown field 'torso' .known: model, base, height."),
+        ({"height": -0.1}, r"robot\.height: -0\.1 is less than 0"),
     ],
 )
 def test_a_fault_of_the_robot_is_named(robot: dict[str, Any], fault: str) -> None:

@@ -10,7 +10,8 @@ from guided_lgp.poses import pose
 from guided_lgp.robots import load_robot
 from guided_lgp.scene import generate
 from guided_lgp.scene.bullet import pybullet
-from guided_lgp.scene.world import MARGIN, Camera, World, initial_poses
+from guided_lgp.scene.tolerances import MARGIN
+from guided_lgp.scene.world import Camera, World, initial_poses
 
 PR2 = load_robot("pr2")
 HAND = PR2.arms["pr2L"].fingers

@@ -12,11 +12,12 @@ from pathlib import Path
 from typing import Annotated, Any, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from guided_lgp.bounds.results import Attachment, Keyframe, PathResult, Trajectory
 from guided_lgp.bounds.verify.attachments import switches_of
-from guided_lgp.documents import first_fault, read_json, write_text
+from guided_lgp.documents import read_json, write_text
+from guided_lgp.faults import Document, first_fault
 from guided_lgp.logic import Action, Goal, Objective, Skeleton
 from guided_lgp.poses import yaw_of
 from guided_lgp.scene import Scene
@@ -29,11 +30,7 @@ Time = Annotated[float, Field(ge=0, le=1e5)]
 Index = Annotated[int, Field(strict=True, ge=0)]
 
 
-class _Document(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class BoxPose(_Document):
+class BoxPose(Document):
     """Where a box is; ``quaternion`` is ``[x, y, z, w]``, since a held box may be tilted."""
 
     position: tuple[Finite, Finite, Finite]
@@ -41,14 +38,14 @@ class BoxPose(_Document):
     quaternion: tuple[Finite, Finite, Finite, Finite]
 
 
-class PlanKeyframe(_Document):
+class PlanKeyframe(Document):
     """The configuration at the switch of one action."""
 
     q: tuple[Angle, ...]
     boxes: dict[str, BoxPose]
 
 
-class PlanAttachment(_Document):
+class PlanAttachment(Document):
     """The box is rigid in the gripper's tool frame from ``start`` to ``end``."""
 
     box: str
@@ -57,7 +54,7 @@ class PlanAttachment(_Document):
     end: Index
 
 
-class PlanPath(_Document):
+class PlanPath(Document):
     """The dense motion."""
 
     times: Annotated[tuple[Time, ...], Field(min_length=1)]
@@ -65,7 +62,7 @@ class PlanPath(_Document):
     attachments: tuple[PlanAttachment, ...]
 
 
-class Plan(_Document):
+class Plan(Document):
     """The whole file."""
 
     scene: Scene

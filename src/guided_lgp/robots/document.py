@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
-from guided_lgp.documents import first_fault
 from guided_lgp.errors import InputError
+from guided_lgp.faults import Document, first_fault
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Length = Annotated[float, Field(gt=0, le=10, allow_inf_nan=False)]
@@ -20,11 +20,7 @@ SIDE = "<side>"
 Axis = Literal["x", "y", "z", "-x", "-y", "-z"]
 
 
-class _Document(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class DescriptionFiles(_Document):
+class DescriptionFiles(Document):
     """Where URDF and SRDF are."""
 
     urdf: str
@@ -32,13 +28,13 @@ class DescriptionFiles(_Document):
     srdf: str | None = None
     package: str | None = None
     """An installed Python package that ships the files."""
-    packages: dict[str, str] = {}
+    packages: dict[str, str] = Field(default_factory=dict)
     """Folders for ``package://NAME`` in the URDF, where they are not above it."""
     limits: Literal["soft", "hard"] = "soft"
     """Whether joints keep inside the limits of the URDF's safety controllers, as real arms do."""
 
 
-class FixedJoint(_Document):
+class FixedJoint(Document):
     """A joint that keeps the value that the scene gives it."""
 
     joint: str
@@ -46,7 +42,7 @@ class FixedJoint(_Document):
     default: Number
 
 
-class ToolDocument(_Document):
+class ToolDocument(Document):
     """The frame between the fingertips, in which objects are held."""
 
     link: str
@@ -60,7 +56,7 @@ class ToolDocument(_Document):
     """Of the palm along the approach, from the frame's origin. Derived: of the palm's shape."""
 
 
-class GapDocument(_Document):
+class GapDocument(Document):
     """Distance of the fingertips at a joint value a: ``sine sin a + cosine cos a + offset``."""
 
     sine: Number
@@ -68,7 +64,7 @@ class GapDocument(_Document):
     offset: Number
 
 
-class FingersDocument(_Document):
+class FingersDocument(Document):
     """The joints that open a hand; all follow the first one, by the URDF's mimic factors."""
 
     joints: tuple[str, ...] = ()
@@ -83,7 +79,7 @@ class FingersDocument(_Document):
     """Widest side of an object that the fingers close across. Derived: 5 mm less than the gap."""
 
 
-class OffsetShoulderDocument(_Document):
+class OffsetShoulderDocument(Document):
     """Measures of an arm whose kinematics are solved by ``offset_shoulder.py``."""
 
     shoulder: tuple[Number, Number, Number]
@@ -102,14 +98,14 @@ class OffsetShoulderDocument(_Document):
     """Range of the pan joint in which solutions are looked for."""
 
 
-class SegmentsDocument(_Document):
+class SegmentsDocument(Document):
     """Links at the ends of the arm's segments, and how far those reach beyond their axes."""
 
     ends: Names
     radius: Length
 
 
-class ArmDocument(_Document):
+class ArmDocument(Document):
     """One arm with its hand."""
 
     side: str = ""
@@ -165,7 +161,7 @@ class ArmDocument(_Document):
         return self
 
 
-class RobotDocument(_Document):
+class RobotDocument(Document):
     """The whole file."""
 
     description: DescriptionFiles
@@ -173,7 +169,7 @@ class RobotDocument(_Document):
     """The link that a scene's ``robot.base`` places: the root of the URDF."""
     stand: tuple[Length, Length] = (0.1, 0.1)
     """Half extents of the column under the base link, where a scene raises it."""
-    fixed_joints: dict[str, FixedJoint] = {}
+    fixed_joints: dict[str, FixedJoint] = Field(default_factory=dict)
     acceleration: Length
     """Limits of acceleration over those of velocity (1/s)."""
     arms: Annotated[dict[str, ArmDocument], Field(min_length=1)]

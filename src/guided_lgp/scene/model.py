@@ -1,6 +1,7 @@
 """The scene document: robot, tables and boxes."""
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,31 +9,71 @@ from typing import Annotated, Any
 
 import numpy as np
 from pydantic import (
+    AfterValidator,
     BaseModel,
     ConfigDict,
     Field,
     SerializerFunctionWrapHandler,
     ValidationError,
+    ValidatorFunctionWrapHandler,
+    WrapValidator,
     field_validator,
     model_serializer,
     model_validator,
 )
 
-from guided_lgp.documents import first_fault, read_json
+from guided_lgp.documents import read_json
 from guided_lgp.domains import PAPER, domain_names, load_domain
+from guided_lgp.faults import Document, brief, first_fault, refuse_unknown
 from guided_lgp.logic import State, Symbols
 from guided_lgp.poses import Array, compose, pose
 from guided_lgp.robots import Robot, load_robot
 
-Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]*$", max_length=32)]
+
+def _no_more_than(most: float, hint: str) -> WrapValidator:
+    """Suspect another unit in numbers that are too large."""
+
+    def check(value: Any, within: ValidatorFunctionWrapHandler) -> Any:
+        if isinstance(value, int | float) and abs(value) > most:
+            raise ValueError(f"{brief(value)} is too large: {hint}")
+        return within(value)
+
+    return WrapValidator(check)
+
+
+_METRES = "lengths are in m; is this in mm or cm?"
+_RADIANS = "angles are in rad; are these degrees?"
+_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
+
+
+def _speakable(name: str) -> str:
+    """Names stand in goals, between blanks and parentheses."""
+    if not _NAME.fullmatch(name):
+        raise ValueError(f"the name {brief(name)} has other characters than letters, digits, _ - .")
+    return name
+
+
+Name = Annotated[
+    str,
+    Field(max_length=64, json_schema_extra={"pattern": f"^{_NAME.pattern}$"}),
+    AfterValidator(_speakable),
+]
 # strict: neither true nor "0.4" is a number
-Coordinate = Annotated[float, Field(strict=True, ge=-10, le=10, allow_inf_nan=False)]
-Angle = Annotated[float, Field(strict=True, ge=-2 * math.pi, le=2 * math.pi, allow_inf_nan=False)]
-Length = Annotated[float, Field(strict=True, ge=0.001, le=5, allow_inf_nan=False)]
-
-
-class _Document(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+Coordinate = Annotated[
+    float,
+    Field(strict=True, ge=-10, le=10, allow_inf_nan=False),
+    _no_more_than(10, _METRES),
+]
+Angle = Annotated[
+    float,
+    Field(strict=True, ge=-2 * math.pi, le=2 * math.pi, allow_inf_nan=False),
+    _no_more_than(2 * math.pi, _RADIANS),
+]
+Length = Annotated[
+    float,
+    Field(strict=True, ge=0.001, le=5, allow_inf_nan=False),
+    _no_more_than(5, _METRES),
+]
 
 
 @dataclass(frozen=True)
@@ -121,10 +162,7 @@ class PlacedRobot(BaseModel):
             name: fixed.default
             for name, fixed in load_robot(data.get("model", "pr2")).fixed_joints.items()
         }
-        accepted = (*cls.model_fields, *defaults)
-        for field in data:
-            if field not in accepted:
-                raise ValueError(f"unknown field {field!r} ({', '.join(accepted)})")
+        refuse_unknown(data, (*cls.model_fields, *defaults))
         return data | {name: data.get(name, value) for name, value in defaults.items()}
 
     @model_serializer(mode="wrap")
@@ -141,7 +179,7 @@ def grasp_axis(size: tuple[float, float, float]) -> int:
     return 0 if size[0] < size[1] else 1
 
 
-class Table(_Document):
+class Table(Document):
     """A fixed support; ``position`` is the centre of its top (m), ``yaw`` in rad."""
 
     name: Name
@@ -150,7 +188,7 @@ class Table(_Document):
     yaw: Angle = 0.0
 
 
-class Box(_Document):
+class Box(Document):
     """A movable box; ``position`` is its centre (m), ``size`` its full extents (m)."""
 
     name: Name
@@ -160,7 +198,7 @@ class Box(_Document):
     on: Name
 
 
-class Scene(_Document):
+class Scene(Document):
     """An initial configuration x_0 with its symbols, and the domain whose actions may be used."""
 
     name: str = "scene"
@@ -192,13 +230,18 @@ class Scene(_Document):
 
     @model_validator(mode="after")
     def _names(self) -> "Scene":
-        grippers = self.robot.description.grippers
-        names = [*grippers, *(t.name for t in self.tables), *(b.name for b in self.boxes)]
+        robot = self.robot.description
+        names = [*(table.name for table in self.tables), *(box.name for box in self.boxes)]
+        parts = {*robot.description.links, Column.name}
+        taken = set(robot.grippers)
         for name in names:
-            if names.count(name) > 1:
+            if name in taken:
                 raise ValueError(f"name {name!r} is used twice")
+            if name in parts:
+                raise ValueError(f"name {name!r} is that of a part of the robot")
+            taken.add(name)
         for box in self.boxes:
-            if box.on not in names or box.on in grippers or box.on == box.name:
+            if box.on not in names or box.on == box.name:
                 raise ValueError(f"box {box.name!r} stands on unknown table {box.on!r}")
         return self
 

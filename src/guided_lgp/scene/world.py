@@ -14,12 +14,10 @@ from numpy.typing import NDArray
 from guided_lgp.poses import Array, compose, pose
 from guided_lgp.scene.bullet import pybullet
 from guided_lgp.scene.model import Scene, Table
+from guided_lgp.scene.tolerances import MARGIN
 
 TABLE_THICKNESS = 0.04
 """Tables and trays are slabs (m) under their top; what holds them up is left out."""
-
-MARGIN = 0.005
-"""Deepest penetration (m) that passes: hulls are wider than the meshes they enclose."""
 
 COLOURS: dict[str, tuple[float, float, float]] = {
     "red": (0.80, 0.16, 0.14),

@@ -320,7 +320,7 @@ def test_missing_and_damaged_data_sets_name_the_stage(dataset: Dataset, tmp_path
     document = json.loads((tmp_path / "dataset.json").read_text())
     document["encoding"]["version"] = 99
     (tmp_path / "dataset.json").write_text(json.dumps(document))
-    with pytest.raises(InputError, match=r"encoding\.version: input should be 1.*build_dataset"):
+    with pytest.raises(InputError, match=r"encoding\.version: 99 is not 1.*build_dataset"):
         load_dataset(tmp_path)
 
 

@@ -12,13 +12,12 @@ from guided_lgp.bounds.program.kernels import SCALE, Kernel, in_frame, kernel
 from guided_lgp.bounds.program.kinematics import RobotKinematics
 from guided_lgp.bounds.program.slots import ZERO
 from guided_lgp.bounds.terms.term import Term
+from guided_lgp.scene.tolerances import BALANCE_INSET
 
 STACK = 8
 """Most boxes in one sum of weights."""
 _LEAST = 1e-3
 """Half (m) of the area that is left on a support narrower than the margins."""
-BALANCE_INSET = 0.005
-"""How far (m) inside the support's top a centre of mass lies at least."""
 
 
 def _kernels(robot: RobotKinematics) -> tuple[Kernel, ...]:
@@ -82,6 +81,14 @@ def check(
     return max(abs(dot(offset, axes[axis])) - top.half[axis] + BALANCE_INSET for axis in (0, 1))
 
 
+def whole_stack(box: str, support: Mapping[str, str]) -> list[str]:
+    """A box and all that it carries."""
+    group = [box]
+    for base in group:  # grows while it is walked
+        group += [above for above, below in support.items() if below == base]
+    return group
+
+
 def _centre_of_mass(
     box: str,
     boxes: Mapping[str, Pose],
@@ -92,9 +99,7 @@ def _centre_of_mass(
     if box not in support.values():
         x, y, z = boxes[box][:3]
         return x, y, z
-    group = [box]
-    for base in group:  # grows while it is walked
-        group += [above for above, below in support.items() if below == base]
+    group = whole_stack(box, support)
     weights = [math.prod(sizes[name]) for name in group]
     x, y, z = (
         sum(w * boxes[name][axis] for w, name in zip(weights, group, strict=True)) / sum(weights)

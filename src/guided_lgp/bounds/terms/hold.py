@@ -25,7 +25,7 @@ from guided_lgp.bounds.program.slots import (
 from guided_lgp.bounds.results import Array
 from guided_lgp.bounds.terms.term import Term, UngraspableError
 from guided_lgp.scene.model import grasp_axis
-from guided_lgp.scene.world import MARGIN
+from guided_lgp.scene.tolerances import MARGIN
 
 PAD_MARGIN = 0.01
 """How far inside the box's side the fingertips are (m)."""

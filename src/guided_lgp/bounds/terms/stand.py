@@ -15,13 +15,10 @@ from guided_lgp.bounds.terms.balanced import inner
 from guided_lgp.bounds.terms.beside import Separation
 from guided_lgp.bounds.terms.hold import least_costs, pitches
 from guided_lgp.bounds.terms.term import Term
+from guided_lgp.scene.tolerances import HEIGHT, LEVEL_ANGLE
 
 CANDIDATES = 6
 """Placements drawn, of which the best to reach is taken."""
-LEVEL_ANGLE = 0.02
-"""Tilt (rad) up to which a box at rest is level."""
-HEIGHT = 0.002
-"""How far (m) the bottom of a box may be off its support's top."""
 _OVERLAP = 20.0
 """Cost per m of overlap with a neighbour: as much as what is missing to reach."""
 

@@ -12,7 +12,8 @@ from guided_lgp.bounds.verify.geometry import declared, grasp_faults, placement_
 from guided_lgp.bounds.verify.joints import finger_faults, rate_faults
 from guided_lgp.bounds.verify.phase import Phase
 from guided_lgp.logic import Skeleton, State, successor
-from guided_lgp.scene.world import MARGIN, World, initial_poses
+from guided_lgp.scene.tolerances import MARGIN
+from guided_lgp.scene.world import World, initial_poses
 
 START = 1e-3
 """How far (rad) the first configuration may be off all arms at their side."""

@@ -10,6 +10,7 @@ from pydantic import ValidationError
 
 from guided_lgp.documents import read_json, write_json
 from guided_lgp.errors import InputError
+from guided_lgp.faults import first_fault
 from guided_lgp.logic import Objective, Symbols, parse_objective
 from guided_lgp.policy.arrays import FloatArray, IntArray
 from guided_lgp.policy.paper.documents import DatasetDocument, in_files
@@ -130,9 +131,7 @@ def load_dataset(directory: Path) -> Dataset:
     try:
         document = DatasetDocument.model_validate(read_json(path, _REMEDY))
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"]))
-        raise InputError(f"{path}: {where}", first["msg"].lower(), _REMEDY) from None
+        raise first_fault(error, str(path), _REMEDY) from None
     encoding = Encoding.parse(document.encoding, str(path), _STAGE)
     own = document.__pydantic_extra__
     names = {kind: own.get(in_files(kind), []) for kind, _ in encoding.slots}

@@ -16,6 +16,7 @@ from pydantic import ValidationError
 
 from guided_lgp.domains import PAPER
 from guided_lgp.errors import InputError
+from guided_lgp.faults import first_fault
 from guided_lgp.logic import Action, Objective, State, Symbols, satisfied, unsatisfied
 from guided_lgp.policy.arrays import FloatArray
 from guided_lgp.policy.paper.documents import EncodingDocument, in_files
@@ -352,9 +353,7 @@ class Encoding:
             )
             faithful = encoding._scaled_whole() and document == encoding.document()
         except ValidationError as error:
-            first = error.errors()[0]
-            key = ".".join(map(str, ("encoding", *first["loc"])))
-            raise InputError(f"{where}: {key}", first["msg"].lower(), remedy) from None
+            raise first_fault(error, where, remedy, within="encoding") from None
         except (KeyError, InputError):
             faithful = False
         if not faithful:

@@ -12,6 +12,7 @@ from pydantic_core import PydanticCustomError
 from guided_lgp.documents import read_json, write_json
 from guided_lgp.domains import PAPER, load_domain
 from guided_lgp.errors import InputError
+from guided_lgp.faults import first_fault
 from guided_lgp.logic import Domain
 from guided_lgp.policy.arrays import BoolArray, FloatArray
 from guided_lgp.policy.relational.encoding import EDGE_FEATURES, NODE_FEATURES, Graphs, Range
@@ -206,9 +207,7 @@ def load_weights(directory: Path) -> Weights:
     try:
         document = _Document.model_validate(read_json(path, _REMEDY))
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"]))
-        raise InputError(f"{path}: {where}", first["msg"].lower(), _REMEDY) from None
+        raise first_fault(error, str(path), _REMEDY) from None
     if (document.nodes, document.edges) != (list(NODE_FEATURES), list(EDGE_FEATURES)):
         raise InputError(f"{path}: nodes, edges", "are not what this program encodes", _REMEDY)
     limits = Range(tuple(document.limits.lower), tuple(document.limits.upper))
