@@ -112,12 +112,6 @@ def test_every_dependency_exists_or_is_made_by_a_stage() -> None:
             assert dependency in made or (ROOT / dependency).exists(), dependency
 
 
-def test_every_figure_is_a_plot_once() -> None:
-    figures = {path.stem for path in (ROOT / "reports/figures").glob("*.svg")}
-    plots = [plot for plot in pipeline()["plots"] if isinstance(plot, str)]
-    assert sorted(plots) == sorted(f"reports/figures/{name}.png" for name in figures)
-
-
 def test_stages_read_declared_parameters_only() -> None:
     sections = {name for name in Params.model_fields if name not in ("parallel", "bounds")}
     assert sections < set(pipeline()["stages"])

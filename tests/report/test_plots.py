@@ -36,6 +36,13 @@ def values(plots: dict[str, Any], name: str) -> list[dict[str, Any]]:
     return points
 
 
+def test_every_figure_is_a_plot_once(rendered: Path) -> None:
+    figures = {path.stem for path in (rendered / "reports/figures").glob("*.svg")}
+    plots = yaml.safe_load((ROOT / "dvc.yaml").read_text(encoding="utf-8"))["plots"]
+    files = [plot for plot in plots if isinstance(plot, str)]
+    assert sorted(files) == sorted(f"reports/figures/{name}.png" for name in figures)
+
+
 def test_learning_curves_of_two_revisions_are_drawn_over_each_other(
     rendered: Path, tmp_path: Path
 ) -> None:
@@ -52,7 +59,7 @@ def test_learning_curves_of_two_revisions_are_drawn_over_each_other(
     shown = json.loads(run(tmp_path, "dvc", "plots", "show", "--json"))
     assert not shown.get("errors")
     files = {path.name for path in (tmp_path / "reports/curves").iterdir()}
-    assert {Path(name).name for name in shown["data"]} >= files | {"headline.png"}
+    assert {Path(name).name for name in shown["data"]} >= files | {"tree_size.png"}
 
     curve = tmp_path / "reports/curves/paper_place_table.csv"
     changed = pd.read_csv(curve)

@@ -12,11 +12,11 @@ from guided_lgp.errors import InputError
 from guided_lgp.params import Params
 from guided_lgp.paths import METRICS
 from guided_lgp.report import render
+from guided_lgp.report.findings import many, tree
 from guided_lgp.report.pages import BEGIN, END, write_pages
 from guided_lgp.report.scalability_tables import winners
 
-FIGURES = {"headline", "scalability", "success", "learning_curves", "confusion"}
-FIGURES |= {"feasible_share", "failures"}
+FIGURES = {"solved", "tree_size", "time", "success", "confusion", "feasible_share", "failures"}
 SETUPS = ("a", "b", "c", "d", "e6", "e8", "e10")
 REPLAYS = ("a", "b", "c", "d", "e10")
 
@@ -76,6 +76,28 @@ def test_a_stopped_planner_has_no_number(rendered: Path) -> None:
     tidy = pd.read_csv(rendered / "reports/tables/table_3_tree_size.csv")
     ours = tidy[(tidy["source"] == "ours") & (tidy["planner"] == "breadth_first")]
     assert ours.set_index("problem")["mean"].isna().sum() == 6
+
+
+def test_the_page_opens_with_the_question_and_the_answer(rendered: Path) -> None:
+    text = (rendered / "reports/report.md").read_text(encoding="utf-8")
+    first, _, rest = text.partition("## Generalization")
+    assert "## Question and answer" in first
+    assert "95.0% / 95.0% of the problems" in first
+    assert "Relational 36" in first
+    assert rest.count("![") == len(FIGURES) + len(SETUPS)
+
+
+def test_a_small_profile_has_answers_too() -> None:
+    assert tree({"a.1": {"guided": {}}}, {}) == "Breadth-first finishes no problem."
+    assert many({"a.1": {}}) == "No problem of more than 5 boxes was tried."
+
+
+def test_what_holds_nearly_everywhere_is_a_sentence(rendered: Path) -> None:
+    text = (rendered / "reports/report.md").read_text(encoding="utf-8")
+    assert re.search(
+        r"In our \d other rows of Table I, at least (99|100)\.\d% of the problems", text
+    )
+    assert "Not drawn, right in" not in text  # every sub-policy of the made-up figures errs
 
 
 def test_curves_have_a_file_per_sub_policy(rendered: Path) -> None:

@@ -36,11 +36,20 @@ DIFFERENCES = (
 """Where this work departs from the paper, or had to choose."""
 
 
+_MARKERS = (
+    "Means over all problems of the same K, slightly shifted sideways to keep planners apart. "
+    "Dashed: greedy. Open markers: the paper's means. White dots: not all problems are solved, and "
+    "the mean is over those that are."
+)
+"""How to read the curves of planners."""
+
+
 def compose(
     inputs: Inputs,
     params: Params,
     novelty: Mapping[str, str],
     tables: Mapping[str, Table],
+    rest: Mapping[str, str],
     replays: Sequence[tuple[str, str]],
 ) -> Document:
     """Arrange the report.
@@ -50,6 +59,7 @@ def compose(
         params: for the seeds.
         novelty: of every objective.
         tables: by name.
+        rest: by figure, what its caption says of that which is not drawn.
         replays: (address, text) of every replay.
     """
     generalization: list[Block] = [
@@ -59,7 +69,8 @@ def compose(
         Picture(
             "success.svg",
             "Outcomes by type of objective",
-            "Test configurations; n: problems not satisfied at the start, per planner.",
+            "Test configurations; n: problems not satisfied at the start, per planner. "
+            f"{rest['success']}",
         ),
     ]
     if "draws" in tables:
@@ -67,36 +78,33 @@ def compose(
         generalization[1:1] = [tables["draws"], Links([("../docs/studies.md", more)])]
     scalability: list[Block] = [
         Picture(
-            "headline.svg",
-            "Tree size and time against the number of actions",
-            "Means over all problems of the same K, slightly shifted sideways to keep planners "
-            "apart. Dashed: greedy; solid: best-first and planners without a policy. Open markers: "
-            "the paper's means. White dots: means over the problems solved, not all are. Crosses: "
-            "stopped at a limit; dotted: that of the tree size.",
+            "solved.svg",
+            "Problems solved",
+            "Over all problems of the same K, each in several configurations.",
         ),
         tables["winners"],
-        tables["table_3_tree_size"],
-        tables["table_3_time"],
         Picture(
-            "scalability.svg",
-            "Tree size and times by type of problem",
-            "Means and standard deviations over the problems of Table III (n there). Without the "
-            "path bound: symbolic, policy and coarse time. Markers as above.",
+            "tree_size.svg",
+            "Tree size against the number of actions",
+            f"{_MARKERS} Crosses: stopped at the limit of the tree size, which is dotted.",
         ),
+        tables["table_3_tree_size"],
+        Picture(
+            "time.svg",
+            "Time to a plan with its motion against the number of actions",
+            f"{_MARKERS} The paper's times are those of its own machine.",
+        ),
+        tables["table_3_time"],
         Folded(tables["table_3_details"]),
     ]
     policy: list[Block] = [
         tables["training"],
-        Picture(
-            "learning_curves.svg",
-            "Learning curves",
-            "Training (thin) with dropout, validation without, on the randomly chosen samples.",
-        ),
+        "Losses by epoch: “dvc plots show”, or the dashboard.",
         Picture(
             "confusion.svg",
-            "Confusion of each sub-policy",
+            "Where sub-policies err",
             "Validation samples in %, rows normalised. Where several actions are right, an entry "
-            "off the diagonal need not be a mistake.",
+            f"off the diagonal need not be a mistake. {rest['confusion']}",
         ),
     ]
     geometry: list[Block] = [
@@ -106,7 +114,8 @@ def compose(
             "feasible_share.svg",
             "Feasible share by arm and table",
             "Share of sequences that stay feasible with one more action, by the arm of that "
-            "action and where it takes the box from or puts it. Training and test configurations.",
+            "action and where it takes the box from or puts it. Training and test configurations. "
+            f"{rest['feasible_share']}",
         ),
         Picture(
             "failures.svg",
@@ -117,7 +126,9 @@ def compose(
     ]
     if "geometry" in tables:
         geometry.append(tables["geometry"])
+    answers = findings.answers(inputs.generalization, inputs.scalability, inputs.timing)
     sections = [
+        Section("Question and answer", [findings.QUESTION, Bullets(answers)]),
         Section("Generalization", generalization),
         Section("Scalability", scalability),
         Section("Policy", policy),
@@ -127,7 +138,7 @@ def compose(
     ]
     if replays:
         text = "Plans as 3D replays in the browser, one self-contained page each."
-        sections.insert(4, Section("Replays", [text, Links(replays)]))
+        sections.insert(5, Section("Replays", [text, Links(replays)]))
     return Document(
         "Guided sequential manipulation planning: results",
         "Tables I and III of “Guided Sequential Manipulation Planning Using a Hierarchical "

@@ -8,10 +8,8 @@ from matplotlib.figure import Figure
 
 from guided_lgp.documents import written_whole
 
-COLUMN = 3.45
-"""Width of a column of a two-column page (in)."""
-PAGE = 7.1
-"""Width of both columns (in)."""
+WIDTH = 4.2
+"""Width of a figure (in): on a telephone, which shows 3.7 in, its letters are still legible."""
 
 STYLE: dict[Any, Any] = {
     "font.family": "STIXGeneral",

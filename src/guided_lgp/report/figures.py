@@ -1,7 +1,6 @@
 """The figures of the report on generalization, training and feasibility."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -10,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from guided_lgp.domains import load_domain
-from guided_lgp.report.drawing import PAGE, STYLE, subplots
-from guided_lgp.report.style import POLICIES, POLICY_COLORS
+from guided_lgp.report.drawing import STYLE, WIDTH, subplots
+from guided_lgp.report.style import POLICIES
 from guided_lgp.search.planners import TABLE_1
 
 OUTCOMES = {
@@ -23,124 +22,66 @@ OUTCOMES = {
 
 @mpl.rc_context(STYLE)
 def success(problems: pd.DataFrame) -> Figure:
-    """Shares of outcomes by type of objective, one panel per planner.
+    """Shares of outcomes by type of objective, one panel per planner below the other.
 
     Args:
         problems: columns planner, kind (type of objective) and outcome, one row per problem
             that is not satisfied at the start.
     """
     planners = [name for name in TABLE_1 if name in set(problems["planner"])]
-    policies = list(dict.fromkeys(TABLE_1[name].policy for name in planners))
-    rows_of = [[n for n in planners if TABLE_1[n].policy == policy] for policy in policies]
     kinds = sorted(set(problems["kind"]), key=lambda kind: (kind.count("+"), kind))
-    figure, axes = subplots(
-        len(policies),
-        max(map(len, rows_of)),
-        PAGE,
-        0.6 + len(policies) * (0.3 + 0.16 * len(kinds)),
-        sharey=True,
-        sharex=True,
-    )
-    for axis in axes.flat:
-        axis.set_visible(False)
-    for planner in planners:
-        variant = TABLE_1[planner]
-        number = policies.index(variant.policy)
-        place = rows_of[number].index(planner)
-        axis = axes[number][place]
-        axis.set_visible(True)
+    height = 0.6 + len(planners) * (0.4 + 0.17 * len(kinds))
+    figure, axes = subplots(len(planners), 1, WIDTH, height, sharex=True)
+    for axis, planner in zip(axes[:, 0], planners, strict=True):
         rows = problems[problems["planner"] == planner]
-        shares = pd.crosstab(rows["kind"], rows["outcome"], normalize="index")
-        counts = rows["kind"].value_counts()
-        left = np.zeros(len(kinds))
-        for outcome, (label, color) in OUTCOMES.items():
-            column = shares.get(outcome, pd.Series(dtype=float)).reindex(kinds).fillna(0.0)
-            axis.barh(
-                range(len(kinds)),
-                100 * column,
-                left=100 * left,
-                color=color,
-                label=label,
-                height=0.72,
-            )
-            left += column.to_numpy()
-        axis.set_title(f"{POLICIES[variant.policy]}:\n{variant.strategy}")
-        axis.set_yticks(
-            range(len(kinds)), [f"{kind} (n = {counts.get(kind, 0)})" for kind in kinds]
-        )
-        axis.tick_params(labelbottom=True, labelleft=place == 0)
-        axis.set_xlim(0, 100)
-        axis.grid(axis="y", visible=False)
-    axes[0][0].invert_yaxis()
-    for axis in axes[-1]:
-        axis.set_xlabel("Problems (%)")
+        _stacked(axis, rows, kinds)
+        axis.set_title(f"{POLICIES[TABLE_1[planner].policy]}: {TABLE_1[planner].strategy}")
+    axes[-1][0].set_xlabel("Problems (%)")
     handles = axes[0][0].get_legend_handles_labels()
     figure.legend(*handles, loc="outside lower center", ncols=3)
     return figure
 
 
-@mpl.rc_context(STYLE)
-def learning_curves(curves: Mapping[str, Mapping[str, Mapping[str, Sequence[float]]]]) -> Figure:
-    """Loss and accuracy by epoch of every sub-policy.
-
-    Args:
-        curves: by name of the sub-policy and policy; training_loss, validation_loss,
-            training_accuracy and validation_accuracy, one value per epoch.
-    """
-    figure, axes = subplots(2, len(curves), PAGE, 3.3, sharex="col", sharey="row")
-    for column, (title, policies) in zip(axes.T, curves.items(), strict=True):
-        for axis, quantity, scale in zip(column, ("loss", "accuracy"), (1, 100), strict=True):
-            for policy, values in policies.items():
-                for split, style in _SPLITS.items():
-                    heights = scale * np.array(values[f"{split}_{quantity}"])
-                    axis.plot(
-                        range(1, len(heights) + 1),
-                        heights,
-                        color=POLICY_COLORS[policy],
-                        label=f"{POLICIES[policy]}, {split}",
-                        **style,
-                    )
-        column[0].set_title(title.replace(": ", ":\n"))
-        column[1].set_xlabel("Epoch")
-    axes[0][0].set_ylabel("Loss (nats)")
-    axes[1][0].set_ylabel("Accuracy (%)")
-    handles: dict[str, Any] = {}
-    for axis in axes.flat:
-        handles |= dict(zip(*reversed(axis.get_legend_handles_labels()), strict=True))
-    figure.legend(handles.values(), handles, loc="outside lower center", ncols=3)
-    return figure
-
-
-_SPLITS: dict[str, dict[str, Any]] = {
-    "training": {"linewidth": 0.8, "alpha": 0.45},
-    "validation": {"linewidth": 1.2},
-}
+def _stacked(axis: Axes, rows: pd.DataFrame, kinds: list[str]) -> None:
+    """A bar per type of objective, in parts by outcome."""
+    shares = pd.crosstab(rows["kind"], rows["outcome"], normalize="index")
+    counts = rows["kind"].value_counts()
+    left = np.zeros(len(kinds))
+    for outcome, (label, color) in OUTCOMES.items():
+        column = 100 * shares.get(outcome, pd.Series(dtype=float)).reindex(kinds).fillna(0.0)
+        axis.barh(range(len(kinds)), column, left=left, color=color, label=label, height=0.72)
+        left += column.to_numpy()
+    axis.set_yticks(range(len(kinds)), [f"{kind} (n = {counts.get(kind, 0)})" for kind in kinds])
+    axis.set_xlim(0, 100)
+    axis.invert_yaxis()
+    axis.grid(axis="y", visible=False)
 
 
 @mpl.rc_context(STYLE)
 def confusion(matrices: Mapping[str, Mapping[str, tuple[Sequence[str], np.ndarray]]]) -> Figure:
-    """Confusion of every sub-policy: rows the action of the data, columns the one predicted.
+    """Confusion of sub-policies: rows the action of the data, columns the one predicted.
 
     Args:
-        matrices: by policy and name of the sub-policy, labels and counts.
+        matrices: by name of the sub-policy and policy, labels and counts.
     """
-    columns = max(matrices.values(), key=len)
-    sizes = [len(labels) + 0.5 for labels, _ in columns.values()]
+    policies = list(dict.fromkeys(policy for row in matrices.values() for policy in row))
+    sizes = [len(next(iter(row.values()))[0]) for row in matrices.values()]
+    height = 0.6 + sum(0.75 + 0.3 * size for size in sizes)
     figure, axes = subplots(
-        len(matrices), len(sizes), PAGE, 2.1 * len(matrices), width_ratios=sizes
+        len(matrices), len(policies), WIDTH, height, height_ratios=[size + 1.5 for size in sizes]
     )
-    for row, (policy, chain) in zip(axes, matrices.items(), strict=True):
-        for axis in row[len(chain) :]:
-            axis.set_visible(False)
-        for axis, (title, (labels, counts)) in zip(row, chain.items(), strict=False):
-            total = np.maximum(counts.sum(axis=1, keepdims=True), 1)
-            shares = counts / total
-            _heat(axis, shares, labels, labels, [[f"{100 * s:.0f}" for s in row] for row in shares])
-            lines = (*title.split(": "), f"(n = {int(counts.sum()):,})")
-            axis.set_title("\n".join(lines), fontsize=8)
-            axis.tick_params(labelsize=6.5, pad=1.5)
-            axis.set_xlabel("predicted", fontsize=8)
-        row[0].set_ylabel(f"{POLICIES[policy]}\nin the data")
+    for row, (title, by_policy) in zip(axes, matrices.items(), strict=True):
+        for axis, policy in zip(row, policies, strict=True):
+            axis.set_visible(policy in by_policy)
+            if policy in by_policy:
+                labels, counts = by_policy[policy]
+                shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
+                texts = [[f"{100 * share:.0f}" for share in line] for line in shares]
+                _heat(axis, shares, labels, labels, texts)
+                axis.set_title(f"{title.replace(': ', ', ')}\n(n = {int(counts.sum()):,})")
+        row[0].set_ylabel("in the data")
+    for axis, policy in zip(axes[-1], policies, strict=True):
+        axis.set_xlabel(f"predicted\n{POLICIES[policy]}")
     return figure
 
 
@@ -154,9 +95,10 @@ def feasible_share(shares: pd.DataFrame) -> Figure:
     titles = {
         one.name: f"{one.name.capitalize()}, {'from' if one.into_hand else 'on'}"
         for one in load_domain().instructions
+        if one.name in set(shares["instruction"])
     }
-    figure, axes = subplots(1, len(titles), PAGE, 1.7)
-    for axis, (instruction, title) in zip(axes[0], titles.items(), strict=True):
+    figure, axes = subplots(len(titles), 1, WIDTH, 1.6 * len(titles))
+    for axis, (instruction, title) in zip(axes[:, 0], titles.items(), strict=True):
         rows = shares[shares["instruction"] == instruction]
         tables = sorted(set(rows["table"]), key=lambda name: ("box" in name, name))
         arms = sorted(set(rows["gripper"]))
@@ -184,7 +126,7 @@ def failures(counts: pd.DataFrame) -> Figure:
     Args:
         counts: index constraint, columns action (1, 2, …), values numbers of sequences.
     """
-    figure, axes = subplots(1, 1, PAGE, 0.8 + 0.24 * len(counts))
+    figure, axes = subplots(1, 1, WIDTH, 1.2 + 0.24 * len(counts))
     axis = axes[0][0]
     left = np.zeros(len(counts))
     colors = mpl.colormaps["viridis"](np.linspace(0.1, 0.85, max(counts.shape[1], 2)))
@@ -203,7 +145,7 @@ def failures(counts: pd.DataFrame) -> Figure:
     axis.set_xlabel("Infeasible sequences")
     axis.grid(axis="y", visible=False)
     if not counts.empty:
-        figure.legend(loc="outside right upper")
+        figure.legend(loc="outside lower center", ncols=2)
     return figure
 
 
@@ -229,6 +171,6 @@ def _heat(
                 text,
                 ha="center",
                 va="center",
-                fontsize=7,
+                fontsize=8,
                 color="white" if dark else "#222222",
             )

@@ -3,8 +3,73 @@
 from collections import Counter
 from collections.abc import Mapping, Sequence
 
+from guided_lgp.report import paper
 from guided_lgp.report.analysis import NEW, RENAMED, SEEN
-from guided_lgp.report.cells import percent
+from guided_lgp.report.cells import number, percent, search_time
+from guided_lgp.report.inputs import Metrics, all_solved, compared
+from guided_lgp.report.scalability_figures import SOLVING
+from guided_lgp.search.planners import TABLE_3
+
+QUESTION = (
+    "Can a small learned policy, which proposes the next action, take the place of exhaustive "
+    "search in task and motion planning: in new scenes, for goals it has not been trained on, for "
+    "longer tasks?"
+)
+
+
+def answers(generalization: Metrics, scalability: Metrics, timing: Metrics) -> list[str]:
+    """What the tables say to :data:`QUESTION`, in four sentences with their figures."""
+    printed, ours = paper.GENERALIZATION["adaptation"], generalization["adaptation"]
+    relational, control = generalization["relational"], generalization["uniform_best_first"]
+    return [
+        "New scenes and goals: with the paper's networks the plan is a shortest one in "
+        f"{pair(ours)} of the problems, over all and over unseen objectives (paper: "
+        f"{pair(printed)}); with the relational policy in {pair(relational)}.",
+        "Without a policy: best-first search, whose cost counts the actions still needed, finds a "
+        f"shortest plan in {pair(control)} of the same problems.",
+        f"Size of the tree: {tree(scalability, timing)}",
+        f"Longer tasks: {many(scalability)}",
+    ]
+
+
+def tree(metrics: Metrics, timing: Metrics) -> str:
+    """How much smaller the guided tree is on the largest problem that breadth-first solves."""
+    finished = [
+        problem.name
+        for problem in compared(metrics)
+        if (cell := metrics[problem.name].get("breadth_first")) and all_solved(cell)
+    ]
+    if not finished:
+        return "Breadth-first finishes no problem."
+    last = finished[-1]
+    nodes = [metrics[last][name]["tree_size_mean"] for name in ("breadth_first", "guided")]
+    seconds = [search_time(timing[last][name]) for name in ("breadth_first", "guided")]
+    faster = f"{seconds[0] / seconds[1]:.1f}" if seconds[0] and seconds[1] else "–"
+    return (
+        f"On {last}, the largest problem that breadth-first finishes, it generates "
+        f"{number(nodes[0], 0)} nodes, guided search {number(nodes[1], 0)}. In time the factor is "
+        f"{faster}: nodes are cheap, geometry is not."
+    )
+
+
+def many(metrics: Metrics) -> str:
+    """How many problems beyond the paper's each planner of the figure solves."""
+    beyond = [metrics[p.name] for p in compared(metrics) if p.name not in paper.SCALABILITY]
+    if not beyond:
+        return "No problem of more than 5 boxes was tried."
+    counts = []
+    for planner in SOLVING:
+        cells = [cells[planner] for cells in beyond if planner in cells]
+        done, given = (sum(cell[key] for cell in cells) for key in ("problems_solved", "problems"))
+        counts.append(f"{TABLE_3[planner].label} {done}")
+    return (
+        f"Of {given} problems of 6 to 10 boxes, solved with a verified path: {'; '.join(counts)}."
+    )
+
+
+def pair(subsets: Metrics) -> str:
+    """Shares of shortest plans over all and over unseen objectives."""
+    return " / ".join(percent(subsets[subset]["shortest"]) for subset in ("all", "unseen"))
 
 
 def unseen(kinds: Mapping[str, str], symmetric: Sequence[str]) -> str:

@@ -1,6 +1,6 @@
 """What the report is made from: metrics, verdicts, problems and scenes, read and checked."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ from guided_lgp.errors import InputError
 from guided_lgp.experiments.problems import PROBLEMS, ProblemClass
 from guided_lgp.paths import EVALUATION, METRICS, REPORTS, SCENES, SEQUENCES, TRAINING
 from guided_lgp.report.style import NETWORKS
-from guided_lgp.scene import GeneratedScenes, load_scenes
+from guided_lgp.scene import GeneratedScenes, Scene, load_scenes
 from guided_lgp.search.planners import TABLE_1
 from guided_lgp.tables import read_table
 
@@ -87,6 +87,13 @@ class Inputs:
         """The setups of the test of scalability."""
         return _setups(self.scalability)
 
+    @property
+    def configurations(self) -> Mapping[str, Scene]:
+        """The scenes of training and test by name."""
+        return {
+            scene.name: scene for name in ("training", "test") for scene in self.scenes[name].scenes
+        }
+
 
 def load_inputs(root: Path) -> Inputs:
     """Read the outputs of the earlier stages.
@@ -138,6 +145,14 @@ def load_inputs(root: Path) -> Inputs:
         ),
         runs=runs,
     )
+
+
+def sub_policies(inputs: Inputs) -> Iterator[tuple[str, str, Metrics]]:
+    """Policy, name and report of every sub-policy."""
+    for policy, networks in inputs.training.items():
+        for network, report in networks.items():
+            for name, trained in report["sub_policies"].items():
+                yield policy, network if network == name else f"{network}: {name}", trained
 
 
 def compared(scalability: Metrics) -> list[ProblemClass]:

@@ -2,12 +2,10 @@
 
 import logging
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
-from matplotlib.figure import Figure
 
 from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.documents import write_json, write_text
@@ -15,10 +13,18 @@ from guided_lgp.logic import parse_skeleton
 from guided_lgp.params import BoundsParams, Params
 from guided_lgp.paths import METRICS, REPORTS
 from guided_lgp.policy.split import training_objectives
-from guided_lgp.report import analysis, figures, scalability_figures, scalability_tables, tables
+from guided_lgp.report import (
+    analysis,
+    figures,
+    panels,
+    scalability_figures,
+    scalability_tables,
+    tables,
+)
 from guided_lgp.report.contents import compose
 from guided_lgp.report.drawing import save
-from guided_lgp.report.inputs import Inputs, Metrics, compared, load_inputs
+from guided_lgp.report.inputs import Inputs, compared, load_inputs, sub_policies
+from guided_lgp.report.panels import Drawing
 from guided_lgp.report.summary import summary
 from guided_lgp.report.table import Table
 from guided_lgp.search.planners import GUIDED, RIVALS, TABLE_3
@@ -65,13 +71,15 @@ def run(params: Params, root: Path) -> None:
             ("csv", table.csv()),
         ):
             write_text(reports / "tables" / f"{table.name}.{suffix}", text)
-    for name, figure in _figures(inputs, params).items():
-        save(figure, reports / "figures", name)
+    drawings = _drawings(inputs, params)
+    for name, drawing in drawings.items():
+        save(drawing.figure, reports / "figures", name)
     for setup in inputs.setups:
         scene = inputs.scenes[f"scalability_{setup}"].scenes[0]
         draw_scene(scene, reports / "figures" / f"setup_{setup}.png")
     replays = _replays(inputs, params.bounds, reports)
-    document = compose(inputs, params, novelty, written, replays)
+    rest = {name: drawing.rest for name, drawing in drawings.items()}
+    document = compose(inputs, params, novelty, written, rest, replays)
     write_text(reports / "report.md", document.markdown())
     write_text(reports / "report.html", document.html(reports))
     logger.info("report: %s", reports / "report.html")
@@ -99,42 +107,26 @@ def _tables(inputs: Inputs, novelty: Mapping[str, str], calls: Mapping[str, floa
     ]
 
 
-def _sub_policies(inputs: Inputs) -> Iterator[tuple[str, str, Metrics]]:
-    """Policy, name and report of every sub-policy."""
-    for policy, networks in inputs.training.items():
-        for network, report in networks.items():
-            for name, trained in report["sub_policies"].items():
-                yield policy, network if network == name else f"{network}: {name}", trained
-
-
 def _write_curves(inputs: Inputs, folder: Path) -> None:
     """One CSV file per sub-policy, a row per epoch, which ``dvc plots`` draws."""
-    for policy, name, report in _sub_policies(inputs):
+    for policy, name, report in sub_policies(inputs):
         file = "_".join((policy, *name.split(": "))) + ".csv"
         curves = pd.DataFrame(report["curves"])
         curves.insert(0, "epoch", range(1, len(curves) + 1))
         write_text(folder / file, curves.to_csv(index=False))
 
 
-def _figures(inputs: Inputs, params: Params) -> Mapping[str, Figure]:
-    scenes = {
-        scene.name: scene for name in ("training", "test") for scene in inputs.scenes[name].scenes
-    }
-    curves: dict[str, dict[str, Metrics]] = {}
-    matrices: dict[str, dict[str, tuple[list[str], np.ndarray]]] = {}
-    for policy, name, report in _sub_policies(inputs):
-        curves.setdefault(name, {})[policy] = report["curves"]
-        counts = report["classes"], np.array(report["confusion"])
-        matrices.setdefault(policy, {})[name] = counts
+def _drawings(inputs: Inputs, params: Params) -> Mapping[str, Drawing]:
     limit = params.compare_scalability.max_tree_size
+    failures = analysis.failures(inputs.verdicts, inputs.configurations)
     return {
-        "headline": scalability_figures.headline(inputs.scalability, inputs.timing, limit),
-        "scalability": scalability_figures.scalability(inputs.scalability, inputs.timing, limit),
-        "success": figures.success(analysis.outcomes(inputs.problems, scenes)),
-        "learning_curves": figures.learning_curves(curves),
-        "confusion": figures.confusion(matrices),
-        "feasible_share": figures.feasible_share(analysis.by_last_action(inputs.verdicts, scenes)),
-        "failures": figures.failures(analysis.failures(inputs.verdicts, scenes)),
+        "tree_size": Drawing(scalability_figures.tree_size(inputs.scalability, limit)),
+        "time": Drawing(scalability_figures.time(inputs.scalability, inputs.timing)),
+        "solved": Drawing(scalability_figures.solved(inputs.scalability)),
+        "success": panels.success(inputs),
+        "confusion": panels.confusion(inputs),
+        "feasible_share": panels.feasible_share(inputs),
+        "failures": Drawing(figures.failures(failures)),
     }
 
 

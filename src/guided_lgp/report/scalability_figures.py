@@ -1,203 +1,143 @@
-"""Figures on scalability: cost against the number of actions, planner by planner."""
+"""Figures on scalability: what a plan costs against its number of actions, by planner."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import Any
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import PercentFormatter
 
-from guided_lgp.experiments.problems import ProblemClass
 from guided_lgp.report import paper
-from guided_lgp.report.cells import search_time
-from guided_lgp.report.drawing import PAGE, STYLE, subplots
+from guided_lgp.report.drawing import STYLE, WIDTH, subplots
 from guided_lgp.report.inputs import Metrics, all_solved, compared
 from guided_lgp.report.style import planner_style
 from guided_lgp.search.planners import RIVALS, TABLE_3
 
-
-@dataclass(frozen=True)
-class Quantity:
-    """What is drawn against the number of actions."""
-
-    title: str
-    mean: str
-    std: str
-    source: Metrics
-    """By problem and planner; a mean is None where there is none."""
-    printed: bool = True
-    """Whether the paper has it."""
-
-
-def _quantities(metrics: Metrics, timing: Metrics) -> tuple[Quantity, Quantity, Quantity]:
-    without_path = {
-        problem: {planner: {"mean": search_time(cell), "std": 0.0} for planner, cell in row.items()}
-        for problem, row in timing.items()
-    }
-    return (
-        Quantity("Tree size (nodes)", "tree_size_mean", "tree_size_std", metrics),
-        Quantity("Time to a plan (s)", "time_mean_s", "time_std_s", timing),
-        Quantity("Without the path bound (s)", "mean", "std", without_path, printed=False),
-    )
+DRAWN = (
+    "breadth_first",
+    "breadth_first_graph",
+    "astar",
+    "uniform_best_first",
+    "guided",
+    "relational",
+)
+"""Those without a policy, the paper's, and the one that ``plan`` uses; the tables have all."""
+SOLVING = ("breadth_first", "astar", "uniform_best_first", "relational")
+"""Planners of the figure of the problems solved, which the README has."""
 
 
 @mpl.rc_context(STYLE)
-def headline(metrics: Metrics, timing: Metrics, limit: int) -> Figure:
-    """Tree size and time against K, one curve per planner, with the paper's points.
+def tree_size(metrics: Metrics, limit: int) -> Figure:
+    """Nodes generated against K, with the paper's points and the limit of the tree size.
 
     A point is the mean over all problems with the same smallest number of actions K.
 
     Args:
         metrics: by problem and planner, None where a planner met the limit of the tree size.
-        timing: as ``metrics``.
         limit: of the tree size.
     """
-    figure, axes = subplots(1, 2, PAGE, 3.7)
-    problems = compared(metrics)
-    for axis, quantity in zip(axes[0], _quantities(metrics, timing)[:2], strict=True):
-        _against_k(axis, problems, quantity, metrics, spread=False)
-        axis.set_xlabel("Smallest number of actions $K$")
-        axis.set_ylabel(quantity.title)
-        _log_axes(axis, problems)
-    _limit(axes[0][0], problems, metrics, limit)
-    _planner_legend(figure, axes)
+    figure, axis = _costs("Tree size (nodes)", "tree_size_mean", metrics, metrics)
+    axis.axhline(limit, color="#999999", linewidth=0.8, linestyle=":")
+    for planner in RIVALS:
+        cells = [(p.k_min, metrics[p.name].get(planner)) for p in compared(metrics)]
+        stopped = sorted({k for k, cell in cells if cell and cell["tree_size_mean"] is None})
+        color = planner_style(TABLE_3[planner])["color"]
+        axis.plot(stopped, [limit] * len(stopped), "x", color=color, markersize=6)
     return figure
 
 
 @mpl.rc_context(STYLE)
-def scalability(metrics: Metrics, timing: Metrics, limit: int) -> Figure:
-    """Tree size and times against the smallest number of actions, by type of problem.
+def time(metrics: Metrics, timing: Metrics) -> Figure:
+    """Time to a plan with its motion against K, with the paper's points; as :func:`tree_size`."""
+    return _costs("Time to a plan (s)", "time_mean_s", timing, metrics)[0]
 
-    Args:
-        metrics: by problem and planner, None where a planner met the limit of the tree size.
-        timing: as ``metrics``.
-        limit: of the tree size.
-    """
-    panels: dict[str, list[ProblemClass]] = {}
-    for problem in compared(metrics):
-        panels.setdefault(problem.target.split()[0], []).append(problem)
-    quantities = _quantities(metrics, timing)
-    figure, axes = subplots(
-        3, len(panels), PAGE, 7.0, sharex="col", sharey="row", width_ratios=_widths(panels)
-    )
-    for row, quantity in zip(axes, quantities, strict=True):
-        for axis, problems in zip(row, panels.values(), strict=True):
-            _against_k(axis, problems, quantity, metrics)
-        row[0].set_ylabel(quantity.title)
-    for axis, problems in zip(axes[0], panels.values(), strict=True):
-        names = ", ".join(problem.name for problem in problems)
-        kind = problems[0].target.split()[0]
-        axis.set_title(f"{_PANELS.get(kind, problems[0].target.capitalize())}\n({names})")
-        _limit(axis, problems, metrics, limit)
-    for axis, problems in zip(axes[-1], panels.values(), strict=True):
-        axis.set_xlabel("Smallest number of actions $K$")
-        axis.set_xticks(sorted({problem.k_min for problem in problems}))
-    for axis in axes.flat:
-        axis.set_yscale("log")
-    _planner_legend(figure, axes)
+
+@mpl.rc_context(STYLE)
+def solved(metrics: Metrics) -> Figure:
+    """The share of problems solved against K: a line per planner of :data:`SOLVING`."""
+    figure, axes = subplots(1, 1, WIDTH, 3.2)
+    axis = axes[0][0]
+    for planner in SOLVING:
+        cells = _by_length(metrics, planner)
+        shares = [
+            sum(cell["problems_solved"] for cell in group) / sum(cell["problems"] for cell in group)
+            for group in cells.values()
+        ]
+        style: dict[str, Any] = planner_style(TABLE_3[planner]) | {"linestyle": "-"}
+        axis.plot(list(cells), shares, label=TABLE_3[planner].label, **style)
+    axis.set_xlabel("Smallest number of actions $K$ (two per box)")
+    axis.set_ylabel("Problems solved")
+    axis.yaxis.set_major_formatter(PercentFormatter(1.0))
+    figure.legend(loc="outside lower center", ncols=2)
     return figure
 
 
-_PANELS = {"stack": "Stack boxes", "place": "Place boxes side by side"}
-"""Titles of problems by the first word of their target; of others, the target itself."""
-
-
-def _widths(panels: Mapping[str, Sequence[ProblemClass]]) -> list[int]:
-    return [len({problem.k_min for problem in problems}) for problems in panels.values()]
-
-
-def _log_axes(axis: Axes, problems: Sequence[ProblemClass]) -> None:
+def _costs(title: str, mean: str, figures: Metrics, metrics: Metrics) -> tuple[Figure, Axes]:
+    """A quantity of the planners of :data:`DRAWN` against K, both axes logarithmic."""
+    figure, axes = subplots(1, 1, WIDTH, 4.0)
+    axis: Axes = axes[0][0]
+    for rank, planner in enumerate(DRAWN):
+        # Side by side, so that equal figures do not hide each other.
+        shift = 1 + 0.008 * (rank - (len(DRAWN) - 1) / 2)
+        _curve(axis, planner, shift, mean, figures, metrics)
+        _printed(axis, planner, shift, mean, metrics)
     axis.set_xscale("log")
     axis.set_yscale("log")
-    lengths = sorted({problem.k_min for problem in problems})
+    lengths = sorted({problem.k_min for problem in compared(metrics)})
     axis.set_xticks(lengths, list(map(str, lengths)))
     axis.minorticks_off()
+    axis.set_xlabel("Smallest number of actions $K$")
+    axis.set_ylabel(title)
+    figure.legend(loc="outside lower center", ncols=2)
+    return figure, axis
 
 
-def _against_k(
-    axis: Axes,
-    problems: Sequence[ProblemClass],
-    quantity: Quantity,
-    metrics: Metrics,
-    spread: bool = True,
+def _curve(
+    axis: Axes, planner: str, shift: float, mean: str, figures: Metrics, metrics: Metrics
 ) -> None:
-    """Draw a quantity of all planners; without ``spread`` on a log axis of K, without bars.
-
-    A white dot marks the mean of a planner that leaves problems of that K unsolved.
-    """
-    for rank, (planner, row) in enumerate(TABLE_3.items()):
-        style: dict[str, Any] = planner_style(row)
-        # Side by side, so that equal figures do not hide each other.
-        side = rank - (len(TABLE_3) - 1) / 2
-        known: dict[int, list[Mapping[str, Any]]] = {}
-        for problem in problems:
-            cell = quantity.source[problem.name].get(planner)
-            if cell and cell[quantity.mean] is not None:
-                known.setdefault(problem.k_min, []).append(cell)
-        places = {k: k * (1 + 0.006 * side) for k in known}
-        if known:
-            lengths = [places[k] for k in known]
-            values = np.array(
-                [np.mean([c[quantity.mean] for c in cells]) for cells in known.values()]
-            )
-            errors = np.array(
-                [np.mean([c[quantity.std] for c in cells]) for cells in known.values()]
-            )
-            # On a log axis an error bar cannot reach zero.
-            bars = (np.minimum(errors, 0.9 * values), errors) if spread else None
-            axis.errorbar(
-                lengths, values, bars, elinewidth=0.7, capsize=1.5, label=row.label, **style
-            )
-            partial = [
-                any(
-                    not all_solved(metrics[p.name][planner])
-                    for p in problems
-                    if p.k_min == k and planner in metrics[p.name]
-                )
-                for k in known
-            ]
-            dots = np.column_stack([lengths, values])[partial]
-            axis.plot(*dots.T, "o", color="white", markersize=2.2, zorder=5)
-        printed = [
-            (p.k_min * (1 + 0.006 * side), paper.SCALABILITY[p.name][planner][quantity.mean])
-            for p in problems
-            if quantity.printed and planner in paper.SCALABILITY.get(p.name, {})
-        ]
-        if printed:
-            axis.plot(
-                *zip(*printed, strict=True),
-                marker=style["marker"],
-                color=style["color"],
-                markerfacecolor="none",
-                markersize=8,
-                markeredgewidth=0.9,
-                linestyle="none",
-                label=f"{row.label} (paper)",
-                zorder=1.5,
-            )
+    """A planner's means; a white dot where it leaves problems of that K unsolved."""
+    cells = _by_length(figures, planner, mean)
+    values = [np.mean([cell[mean] for cell in group]) for group in cells.values()]
+    places = [k * shift for k in cells]
+    if cells:
+        style: dict[str, Any] = planner_style(TABLE_3[planner])
+        axis.plot(places, values, label=TABLE_3[planner].label, **style)
+    counts = _by_length(metrics, planner)
+    partial = [not all(map(all_solved, counts[k])) for k in cells]
+    axis.plot(*np.column_stack([places, values])[partial].T, "o", color="white", ms=2.2, zorder=5)
 
 
-def _limit(axis: Axes, problems: Sequence[ProblemClass], metrics: Metrics, limit: int) -> None:
-    """Mark the limit of the tree size, and which planners without a policy met it where."""
-    axis.axhline(limit, color="#999999", linewidth=0.8, linestyle=":")
-    for planner in RIVALS:
-        cells = [(p.k_min, metrics[p.name].get(planner)) for p in problems]
-        stopped = sorted({k for k, cell in cells if cell and cell["tree_size_mean"] is None})
+def _printed(axis: Axes, planner: str, shift: float, mean: str, metrics: Metrics) -> None:
+    """The paper's means, a large open marker each."""
+    points = [
+        (problem.k_min * shift, paper.SCALABILITY[problem.name][planner][mean])
+        for problem in compared(metrics)
+        if planner in paper.SCALABILITY.get(problem.name, {})
+    ]
+    style = planner_style(TABLE_3[planner])
+    if points:
         axis.plot(
-            stopped,
-            [limit] * len(stopped),
-            "x",
-            color=planner_style(TABLE_3[planner])["color"],
-            markersize=6,
+            *zip(*points, strict=True),
+            marker=style["marker"],
+            color=style["color"],
+            markerfacecolor="none",
+            markersize=8,
+            markeredgewidth=0.9,
+            linestyle="none",
+            label=f"{TABLE_3[planner].label} (paper)",
+            zorder=1.5,
         )
 
 
-def _planner_legend(figure: Figure, axes: np.ndarray) -> None:
-    handles: dict[str, Any] = {}
-    for axis in axes.flat:
-        handles = dict(zip(*reversed(axis.get_legend_handles_labels()), strict=True)) | handles
-    labels = [f"{row.label}{origin}" for row in TABLE_3.values() for origin in ("", " (paper)")]
-    shown = [label for label in labels if label in handles]
-    figure.legend([handles[label] for label in shown], shown, loc="outside lower center", ncols=4)
+def _by_length(
+    figures: Metrics, planner: str, mean: str | None = None
+) -> dict[int, list[Mapping[str, Any]]]:
+    """A planner's cells by K, those without a mean left out."""
+    found: dict[int, list[Mapping[str, Any]]] = {}
+    for problem in compared(figures):
+        cell = figures[problem.name].get(planner)
+        if cell and (mean is None or cell[mean] is not None):
+            found.setdefault(problem.k_min, []).append(cell)
+    return found
