@@ -74,3 +74,21 @@ def test_a_planted_link_is_not_followed(clone: Path) -> None:
 def test_outside_a_clone_there_is_no_lock(tmp_path: Path) -> None:
     with alone(tmp_path, "stage"), alone(tmp_path, "stage"):
         assert list(tmp_path.iterdir()) == []
+
+
+STUDY = """
+import runpy, sys
+from guided_lgp.cli import alone
+alone.PATIENCE_S = 0.3
+del sys.argv[0]
+runpy.run_path(sys.argv[0], run_name="__main__")
+"""
+
+
+def test_a_study_runs_once_at_a_time(clone: Path) -> None:
+    file = Path(__file__).parents[1] / "studies" / "run.py"
+    command = [sys.executable, "-c", STUDY, str(file), "render"]
+    with alone(clone, "studies render"):
+        done = subprocess.run(command, cwd=clone, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr.startswith("error: studies render: runs already in this clone: process")

@@ -171,11 +171,20 @@ def test_what_a_kill_left_is_taken_away(folder: Path) -> None:
     assert not leftover.exists()
 
 
-def test_a_kept_file_is_mended(folder: Path, tmp_path: Path) -> None:
+def test_a_kept_file_is_mended_with_one_line(
+    folder: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     file = cache.kept("robot.urdf", b"<robot/>")
+    assert not caplog.records
     for damage in (b"", b"<rob", b"<another/>"):
         file.write_bytes(damage)
+        assert cache.damaged() == [file]
         assert cache.kept("robot.urdf", b"<robot/>").read_bytes() == b"<robot/>"
+        assert [record.message for record in caplog.records] == [
+            f"{file} is damaged and made again"
+        ]
+        assert not cache.damaged()
+        caplog.clear()
     victim = tmp_path / "victim"
     victim.write_bytes(b"<mine/>")
     file.unlink()

@@ -14,7 +14,7 @@ from contextlib import contextmanager, suppress
 from hashlib import sha256
 from pathlib import Path
 
-from guided_lgp.documents import written_whole
+from guided_lgp.documents import remove, written_whole
 from guided_lgp.errors import InputError
 
 ACCEPTED = "a writable $XDG_CACHE_HOME of one's own"
@@ -61,9 +61,9 @@ def kept(name: str, content: bytes) -> Path:
         InputError: the folder cannot be used.
     """
     file = private_folder() / name
-    if _content(file) != content:
+    if not is_whole(file) or _content(file) != content:
         with _named_errors(file.parent):
-            _put(file, content)
+            _store(file, content)
     return file
 
 
@@ -83,17 +83,14 @@ def made(name: str, make: Callable[[Path], bytes | None]) -> Path | None:
     with _named_errors(file.parent), _alone(file):
         if is_whole(file):  # made by the process that this one has waited for
             return file
-        if os.path.lexists(file):
-            logger.warning("%s is damaged and made again", file)
         prefix = f"{_UNFINISHED}{name}-"
         for leftover in file.parent.glob(f"{prefix}*"):  # of a process that was killed
-            _remove(leftover)
+            remove(leftover)
         with tempfile.TemporaryDirectory(prefix=prefix, dir=file.parent) as folder:
             content = make(Path(folder))
         if content is None:
             return None
-        _put(file, content)
-        _put(_digest_of(file), sha256(content).hexdigest().encode())
+        _store(file, content)
     return file
 
 
@@ -106,7 +103,7 @@ def is_whole(file: Path) -> bool:
 
 
 def damaged() -> list[Path]:
-    """Entries of the folder that will be made again: without their digest, or with another."""
+    """Entries of the folder that are not what was written; they will be made again."""
     entries = [file for file in private_folder().iterdir() if _digest_of(file).exists()]
     return sorted(file for file in entries if not is_whole(file))
 
@@ -116,7 +113,7 @@ def clear() -> None:
     folder = private_folder()
     with _named_errors(folder):
         for entry in folder.iterdir():
-            _remove(entry)
+            remove(entry)
 
 
 def _digest_of(file: Path) -> Path:
@@ -137,10 +134,18 @@ def _content(file: Path) -> bytes | None:
     return None
 
 
+def _store(file: Path, content: bytes) -> None:
+    """Put a file in place, its digest first; says so where something else was there."""
+    if os.path.lexists(file):
+        logger.warning("%s is damaged and made again", file)
+    _put(_digest_of(file), sha256(content).hexdigest().encode())
+    _put(file, content)
+
+
 def _put(file: Path, content: bytes) -> None:
     """Put a file in place whole, instead of whatever is there."""
     if file.is_dir() and not file.is_symlink():
-        _remove(file)
+        remove(file)
     with written_whole(file) as unfinished:
         unfinished.write_bytes(content)
         unfinished.chmod(0o600)
@@ -163,15 +168,6 @@ def _alone(file: Path) -> Iterator[None]:
         yield
     finally:
         os.close(descriptor)
-
-
-def _remove(entry: Path) -> None:
-    if entry.is_dir() and not entry.is_symlink():
-        for inner in entry.iterdir():
-            _remove(inner)
-        entry.rmdir()
-    else:
-        entry.unlink(missing_ok=True)
 
 
 @contextmanager

@@ -6,6 +6,7 @@ import math
 import os
 import re
 import secrets
+import shutil
 import stat
 import sys
 import time
@@ -236,16 +237,61 @@ def written_whole(path: Path) -> Iterator[Path]:
             os.close(descriptor)
 
 
+@contextmanager
+def made_whole(folder: Path) -> Iterator[Path]:
+    """Make a folder such that nobody ever sees half of it, whatever ends the program.
+
+    What a killed maker left is taken away by the next one.
+
+    Args:
+        folder: is not there, or is empty.
+
+    Yields:
+        The path of a folder to make, of the same name.
+
+    Raises:
+        InputError: the folder cannot be made, or is there with something in it.
+    """
+    end = folder.name[-_LONGEST_END:]
+    with _named_errors(folder):
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        _remove_leftovers(folder.parent, end)
+        own = folder.with_name(f"{_UNFINISHED}{secrets.token_hex(8)}-{end}")
+        own.mkdir()
+        descriptor = os.open(own, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+        try:
+            with suppress(OSError):  # of file systems without locks
+                fcntl.flock(descriptor, fcntl.LOCK_EX)
+            yield own / folder.name
+            (own / folder.name).rename(folder)
+        finally:
+            with suppress(OSError):
+                remove(own)
+            os.close(descriptor)
+
+
+def remove(entry: Path) -> None:
+    """Remove a file, a link or a whole folder, if it is there; links are not followed.
+
+    Raises:
+        OSError: it cannot be removed.
+    """
+    if entry.is_dir() and not entry.is_symlink():
+        shutil.rmtree(entry)
+    else:
+        entry.unlink(missing_ok=True)
+
+
 def _remove_leftovers(folder: Path, end: str) -> None:
-    """Remove what killed writers of a file left: old enough to be locked, and nobody's lock."""
-    for file in folder.glob(f"{_UNFINISHED}*-{escape(end)}"):
+    """Remove what killed writers left: old enough to be locked, and nobody's lock."""
+    for entry in folder.glob(f"{_UNFINISHED}*-{escape(end)}"):
         with suppress(OSError):
-            if time.time() - file.lstat().st_mtime > _LEFTOVER_S and _is_free(file):
-                file.unlink()
+            if time.time() - entry.lstat().st_mtime > _LEFTOVER_S and _is_free(entry):
+                remove(entry)
 
 
-def _is_free(file: Path) -> bool:
-    descriptor = os.open(file, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
+def _is_free(entry: Path) -> bool:
+    descriptor = os.open(entry, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:

@@ -1,9 +1,9 @@
 """Tables on disk: written whole or not at all, refused if of another version."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from types import MappingProxyType
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -26,37 +26,49 @@ def write_table(path: Path, table: pa.Table) -> None:
         pq.write_table(stamped, unfinished, write_page_checksum=True)
 
 
-def read_table(path: Path, stage: str, columns: Sequence[str]) -> list[dict[str, Any]]:
-    """Read columns of a Parquet file as one dictionary per row.
+def columns_of(schema: pa.Schema, names: Collection[str], filled: Collection[str]) -> pa.Schema:
+    """Some columns of a table, for :func:`read_columns`.
+
+    Args:
+        schema: of the whole table.
+        names: the columns, in this order.
+        filled: those without null.
+    """
+    return pa.schema([schema.field(name).with_nullable(name not in filled) for name in names])
+
+
+def read_columns(
+    path: Path,
+    stage: str,
+    columns: pa.Schema,
+    known: Mapping[str, Collection[str]] = MappingProxyType({}),
+) -> pa.Table:
+    """Read columns of a Parquet file, of these types and, unless they may be, without null.
 
     Args:
         path: the file.
         stage: the stage that makes it, for the message.
         columns: those wanted.
+        known: the values that a column may have, where these are names.
 
     Raises:
-        InputError: the file is missing, damaged or of another version.
+        InputError: the file is missing, damaged or of another version, or has other types or
+            unknown names.
     """
-    with _readable(path, stage) as parquet:
-        rows: list[dict[str, Any]] = parquet(columns).to_pylist()
-    return rows
-
-
-def read_columns(path: Path, stage: str, columns: pa.Schema) -> pa.Table:
-    """Read columns of a Parquet file, of these types and, unless they may be, without null.
-
-    Raises:
-        InputError: the file is missing, damaged or of another version, or has other types.
-    """
-    with _readable(path, stage) as parquet:
+    remedy = f"the output of stage {stage}"
+    with _readable(path, remedy) as parquet:
         table = parquet(columns.names)
         for column in columns:
             found = table.schema.field(column.name).type
             if not pa.types.is_null(found) and _kind(found) != _kind(column.type):
                 fault = f"has {found} in the column {column.name!r}, not {column.type}"
-                raise InputError(str(path), fault, f"the output of stage {stage}")
+                raise InputError(str(path), fault, remedy)
         table = table.cast(columns)
         table.validate(full=True)  # strings that are no UTF-8, for instance
+    for name, accepted in known.items():
+        for value in table[name].unique().to_pylist():
+            if value is not None and value not in accepted:
+                raise InputError(f"{path}: {name}", f"unknown {value!r}", remedy)
     return table
 
 
@@ -71,13 +83,12 @@ def _kind(column: pa.DataType) -> str:
 
 
 @contextmanager
-def _readable(path: Path, stage: str) -> Iterator[Callable[[Sequence[str]], pa.Table]]:
+def _readable(path: Path, remedy: str) -> Iterator[Callable[[Sequence[str]], pa.Table]]:
     """A function that reads columns; what goes wrong is one line.
 
     Raises:
         InputError: see above.
     """
-    remedy = f"the output of stage {stage}"
 
     def read(columns: Sequence[str]) -> pa.Table:
         version = (pq.read_schema(path).metadata or {}).get(_KEY)

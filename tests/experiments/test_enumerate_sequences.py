@@ -13,7 +13,8 @@ from guided_lgp.logic import Skeleton
 from guided_lgp.params import BoundsParams, Params, load_params
 from guided_lgp.scene import Scene, generate
 from guided_lgp.search.observation import start
-from guided_lgp.tables import read_table
+from guided_lgp.sequences import SHORTEST
+from guided_lgp.tables import read_columns
 
 OUTPUTS = [
     f"{split}{suffix}.parquet" for split in ("training", "test") for suffix in ("", "_shortest")
@@ -111,6 +112,41 @@ def test_a_run_that_was_killed_after_its_last_shard_recomputes_none(
     assert len(list((root / "data" / ".shards").iterdir())) == 4
 
 
+@pytest.mark.parametrize("damage", ["truncated", "missing", "other bytes", "no digests", "a file"])
+def test_a_damaged_shard_is_computed_again(
+    damage: str,
+    tmp_path: Path,
+    params: Params,
+    scripted: type[OneHand],
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    root = make_root(tmp_path)
+    enumerate_sequences.run(params, root)
+    whole = {name: (root / "data" / "sequences" / name).read_bytes() for name in OUTPUTS}
+    shard = min((root / "data" / ".shards").iterdir())
+    file = shard / "verdicts.parquet"
+    content = file.read_bytes()
+    match damage:
+        case "truncated":
+            file.write_bytes(content[: len(content) // 2])
+        case "missing":
+            file.unlink()
+        case "other bytes":
+            file.write_bytes(content[:100] + b"X" + content[101:])
+        case "no digests":
+            (shard / "digests.txt").unlink()
+        case "a file":
+            shutil.rmtree(shard)
+            shard.write_bytes(b"half")
+    caplog.clear()
+    enumerate_sequences.run(params, root)
+    warnings = [record.message for record in caplog.records if record.levelname == "WARNING"]
+    assert warnings == [f"{shard} is damaged and computed again"]
+    assert len(scripted.opened) == 5
+    for name in OUTPUTS:
+        assert (root / "data" / "sequences" / name).read_bytes() == whole[name]
+
+
 def test_what_the_tables_hold(tmp_path: Path, params: Params, scripted: type[OneHand]) -> None:
     root = make_root(tmp_path)
     enumerate_sequences.run(params, root)
@@ -129,8 +165,8 @@ def test_what_the_tables_hold(tmp_path: Path, params: Params, scripted: type[One
                 "reach",
             )
             assert row["failure_violation"] is None
-    columns = ["configuration", "objective", "symbolic_length", "length"]
-    shortest = read_table(folder / "training_shortest.parquet", "enumerate_sequences", columns)
+    file = folder / "training_shortest.parquet"
+    shortest = read_columns(file, "enumerate_sequences", SHORTEST).to_pylist()
     assert len(shortest) == 2 * 87
     both_held = [row for row in shortest if row["objective"] == "(held red) (held green)"]
     assert [(row["symbolic_length"], row["length"]) for row in both_held] == [(2, None)] * 2

@@ -3,7 +3,7 @@
 import json
 import math
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -39,7 +39,7 @@ from guided_lgp.report.inputs import read_object
 from guided_lgp.scene import GeneratedScenes, generate, load_scene, load_scenes
 from guided_lgp.scene.setups import SETUPS
 from guided_lgp.sequences import SHORTEST, VERDICTS
-from guided_lgp.tables import read_table, write_table
+from guided_lgp.tables import read_columns, write_table
 
 SYMBOLS = load_domain().symbols(
     gripper=("pr2L", "pr2R"), box=("red", "green", "blue"), table=("tab1", "tab2")
@@ -135,14 +135,13 @@ def tables(scenes: Path, folder: Path) -> Mapping[str, Path]:
     return paths
 
 
-COLUMNS = {"verdicts": VERDICTS.names, "shortest": SHORTEST.names}
+COLUMNS = {"verdicts": VERDICTS, "shortest": SHORTEST}
 
 
-def table(path: Path, columns: Sequence[str]) -> list[dict[str, Any]] | None:
-    rows = answer(lambda: read_table(path, STAGE, columns), path)
-    for row in rows or ():
-        assert list(row) == list(columns)
-    return rows
+def table(path: Path, columns: pa.Schema) -> pa.Table | None:
+    found = answer(lambda: read_columns(path, STAGE, columns), path)
+    assert found is None or found.schema == columns
+    return found
 
 
 @examples(100)
@@ -177,7 +176,7 @@ def test_garbled_values_are_not_taken_for_others(
     file = folder / "values.parquet"
     file.write_bytes(data.draw(overwritten(content[:footer])) + content[footer:])
     found = table(file, COLUMNS[name])
-    assert found is None or found == read_table(tables[name], STAGE, COLUMNS[name])
+    assert found is None or found.equals(read_columns(tables[name], STAGE, COLUMNS[name]))
 
 
 @examples(60)
@@ -194,12 +193,12 @@ def test_tables_of_another_make(
     columns: dict[str, list[int]], version: bytes | None, folder: Path
 ) -> None:
     file = folder / "other.parquet"
-    wanted = ["configuration", "length"]
+    wanted = pa.schema([("configuration", pa.int64()), ("length", pa.int64())])
     written = pa.table(columns)
     metadata = None if version is None else {b"guided_lgp": version}
     pq.write_table(written.replace_schema_metadata(metadata), file)
-    rows = table(file, wanted)
-    assert (rows is not None) == (version == b"1" and set(wanted) <= set(columns))
+    found = table(file, wanted)
+    assert (found is not None) == (version == b"1" and set(wanted.names) <= set(columns))
 
 
 @examples(150)
@@ -453,7 +452,7 @@ def test_the_undamaged_files_are_read(
 ) -> None:
     found = load_scenes(scenes)
     assert isinstance(found, GeneratedScenes)
-    assert len(read_table(tables["verdicts"], STAGE, VERDICTS.names)) == 9
+    assert len(read_columns(tables["verdicts"], STAGE, VERDICTS)) == 9
     assert len(load_dataset(dataset)) == 30
     for network in Encoding().chains:
         check_model(load_model(models, network), network)

@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from urllib.parse import quote
 
 from guided_lgp.errors import InputError
 
@@ -32,7 +33,7 @@ def alone(root: Path, stage: str) -> Iterator[None]:
     if not (root / ".dvc").is_dir():
         yield
         return
-    file = root / ".dvc" / "tmp" / "guided-lgp" / f"{stage}.lock"
+    file = root / ".dvc" / "tmp" / "guided-lgp" / f"{quote(stage, safe='@')}.lock"
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
         flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC

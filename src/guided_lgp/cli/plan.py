@@ -10,7 +10,7 @@ import typer
 
 from guided_lgp import __version__
 from guided_lgp.cli.outputs import destinations
-from guided_lgp.cli.terminal import AsJson, is_plan, one_of, show, spinner
+from guided_lgp.cli.terminal import AsJson, is_plan, one_of, seconds, show, spinner
 from guided_lgp.documents import STANDARD_OUTPUT
 from guided_lgp.domains import domain_names
 from guided_lgp.errors import InputError
@@ -84,7 +84,7 @@ def plan(
     timeout: Annotated[
         float | None,
         typer.Option(
-            min=0.001,
+            parser=seconds,
             metavar="SECONDS",
             help="Give up after so many seconds.",
             show_default="no limit of time",

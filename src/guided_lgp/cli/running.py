@@ -2,8 +2,10 @@
 
 import logging
 import os
+import signal
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import NoReturn
 
 import typer
@@ -38,6 +40,28 @@ def run_program(program: Callable[[list[str]], int | None], arguments: Sequence[
     except Exception as error:
         _fail(error, 3, debug)
     sys.exit(code)
+
+
+@contextmanager
+def within(seconds: float | None, what: str) -> Iterator[None]:
+    """End the program with code 1 and one line when something takes longer; its workers with it.
+
+    Args:
+        seconds: how long it may take; None for ever.
+        what: its name, for the line.
+    """
+
+    def end(*_: object) -> NoReturn:
+        # No Exception, which libraries would take for a fault of their own.
+        raise SystemExit(f"{what}: not finished after {seconds:g} s")
+
+    before = signal.signal(signal.SIGALRM, end)
+    signal.setitimer(signal.ITIMER_REAL, seconds or 0)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
 
 
 _EXTRAS = {

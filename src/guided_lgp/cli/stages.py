@@ -11,7 +11,8 @@ from typing import Annotated
 import typer
 
 from guided_lgp.cli.alone import alone
-from guided_lgp.cli.terminal import ParamsFile
+from guided_lgp.cli.running import within
+from guided_lgp.cli.terminal import ParamsFile, TimeLimit
 from guided_lgp.paths import PARAMS
 
 app = typer.Typer()
@@ -42,93 +43,95 @@ NetworkName = Annotated[Network, typer.Argument(help="Which of the three network
 
 
 @app.command("generate_scenes")
-def generate_scenes(params: ParamsFile = PARAMS) -> None:
+def generate_scenes(params: ParamsFile = PARAMS, timeout: TimeLimit = None) -> None:
     """Draw the scenes for training, test and scalability. Writes data/scenes.
 
     Example: guided-lgp generate_scenes
     """
-    _run_stage("generate_scenes", params)
+    _run_stage("generate_scenes", params, timeout)
 
 
 @app.command("enumerate_sequences")
-def enumerate_sequences(params: ParamsFile = PARAMS) -> None:
+def enumerate_sequences(params: ParamsFile = PARAMS, timeout: TimeLimit = None) -> None:
     """Find every shortest feasible sequence of actions in every scene. Writes data/sequences.
 
     Example: guided-lgp enumerate_sequences
     """
-    _run_stage("enumerate_sequences", params)
+    _run_stage("enumerate_sequences", params, timeout)
 
 
 @app.command("build_dataset")
-def build_dataset(params: ParamsFile = PARAMS) -> None:
+def build_dataset(params: ParamsFile = PARAMS, timeout: TimeLimit = None) -> None:
     """Turn the sequences into samples for training. Writes data/dataset.
 
     Example: guided-lgp build_dataset
     """
-    _run_stage("build_dataset", params)
+    _run_stage("build_dataset", params, timeout)
 
 
 @app.command("train_policy")
 def train_policy(
     network: NetworkName,
     params: ParamsFile = PARAMS,
+    timeout: TimeLimit = None,
 ) -> None:
     """Train one network of the paper's policy. Writes models, reports/training.
 
     Example: guided-lgp train_policy place
     """
-    _run_stage("train_policy", params, network.value)
+    _run_stage("train_policy", params, timeout, network.value)
 
 
 @app.command("train_improved")
 def train_improved(
     network: NetworkName,
     params: ParamsFile = PARAMS,
+    timeout: TimeLimit = None,
 ) -> None:
     """Train one network of the improved policy. Writes models/improved, reports/training/improved.
 
     Example: guided-lgp train_improved place
     """
-    _run_stage("train_improved", params, network.value)
+    _run_stage("train_improved", params, timeout, network.value)
 
 
 @app.command("train_relational")
-def train_relational(params: ParamsFile = PARAMS) -> None:
+def train_relational(params: ParamsFile = PARAMS, timeout: TimeLimit = None) -> None:
     """Train the relational policy. Writes models, reports/training.
 
     Example: guided-lgp train_relational
     """
-    _run_stage("train_relational", params)
+    _run_stage("train_relational", params, timeout)
 
 
 @app.command("evaluate_generalization")
-def evaluate_generalization(params: ParamsFile = PARAMS) -> None:
+def evaluate_generalization(params: ParamsFile = PARAMS, timeout: TimeLimit = None) -> None:
     """Plan every objective in every test scene (Table I). Writes reports/metrics.
 
     Example: guided-lgp evaluate_generalization
     """
-    _run_stage("evaluate_generalization", params)
+    _run_stage("evaluate_generalization", params, timeout)
 
 
 @app.command("compare_scalability")
-def compare_scalability(params: ParamsFile = PARAMS) -> None:
+def compare_scalability(params: ParamsFile = PARAMS, timeout: TimeLimit = None) -> None:
     """Compare the planners on problems of growing length (Table III). Writes reports/metrics.
 
     Example: guided-lgp compare_scalability
     """
-    _run_stage("compare_scalability", params)
+    _run_stage("compare_scalability", params, timeout)
 
 
 @app.command("render_reports")
-def render_reports(params: ParamsFile = PARAMS) -> None:
+def render_reports(params: ParamsFile = PARAMS, timeout: TimeLimit = None) -> None:
     """Draw the tables, figures and replays. Writes reports/report.html, reports/report.md.
 
     Example: guided-lgp render_reports
     """
-    _run_stage("render_reports", params)
+    _run_stage("render_reports", params, timeout)
 
 
-def _run_stage(stage: str, params_file: Path, *arguments: str) -> None:
+def _run_stage(stage: str, params_file: Path, timeout: float | None, *arguments: str) -> None:
     """Check all parameters, then run a stage, once at a time in a clone, and record it."""
     from guided_lgp import tracking
     from guided_lgp.params import load_params
@@ -137,8 +140,9 @@ def _run_stage(stage: str, params_file: Path, *arguments: str) -> None:
     params = load_params(params_file)
     module = import_module(STAGES[stage])
     address = "@".join([stage, *arguments])
-    with alone(Path.cwd(), address), tracking.recorded(address, params):
-        module.run(params, Path.cwd(), *arguments)
+    root = Path.cwd()
+    with within(timeout, address), alone(root, address), tracking.recorded(address, params):
+        module.run(params, root, *arguments)
 
 
 def end_with_dvc() -> None:

@@ -1,5 +1,6 @@
 """What the commands share: options, and what they show on a terminal."""
 
+import math
 import sys
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
@@ -10,12 +11,43 @@ import typer
 
 from guided_lgp.documents import read_json
 
+_LONGEST_S = 1e8
+"""Three years: what the operating system's timers can count."""
+
 AsJson = Annotated[
     bool,
     typer.Option("--json", help="Write JSON to standard output.", show_default="text"),
 ]
 ParamsFile = Annotated[
     Path, typer.Option(metavar="FILE", help="YAML file with the parameters of all stages.")
+]
+
+
+def seconds(word: str) -> float:
+    """A length of time on the command line.
+
+    Raises:
+        BadParameter: it is none.
+    """
+    try:
+        value = float(word)
+    except ValueError:
+        value = math.nan
+    if not 0.001 <= value <= _LONGEST_S:  # nor is NaN
+        raise typer.BadParameter(f"{word!r} is no number of seconds from 0.001 to {_LONGEST_S:g}")
+    return value
+
+
+TimeLimit = Annotated[
+    float | None,
+    typer.Option(
+        "--timeout",
+        parser=seconds,
+        metavar="SECONDS",
+        help="End after so many seconds. The enumeration goes on there the next time, other "
+        "stages begin again.",
+        show_default="no limit of time",
+    ),
 ]
 
 

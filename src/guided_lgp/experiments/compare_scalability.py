@@ -20,6 +20,7 @@ from guided_lgp import parallel
 from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.documents import write_json
 from guided_lgp.experiments.memory import peak_mb, reset_peak
+from guided_lgp.experiments.outcomes import SCALABILITY
 from guided_lgp.experiments.policies import load_policies
 from guided_lgp.experiments.problems import PROBLEMS
 from guided_lgp.logic import format_objective, format_skeleton
@@ -35,26 +36,6 @@ Row = dict[str, Any]
 
 COUNTS = ("expansions", "policy_calls", "coarse_calls", "path_calls")
 TIMES = ("symbolic", "policy", "coarse", "path")
-
-ROWS = pa.schema(
-    [
-        ("problem", pa.string()),
-        ("configuration", pa.string()),
-        ("objective", pa.string()),
-        ("planner", pa.string()),
-        ("solved", pa.bool_()),
-        ("reason", pa.string()),
-        ("skeleton", pa.string()),
-        ("length", pa.int32()),
-        ("tree_size", pa.int32()),
-        ("expansions", pa.int32()),
-        ("policy_calls", pa.int32()),
-        ("coarse_calls", pa.int32()),
-        ("path_calls", pa.int32()),
-        ("reattempts_infeasible", pa.int32()),
-        ("reattempts_max_depth", pa.int32()),
-    ]
-)
 
 logger = logging.getLogger(__name__)
 
@@ -81,7 +62,7 @@ def run(params: Params, root: Path) -> None:
     parts = parallel.run(compare, longest_first, params.parallel, "scalability")
     rows = [row for part in reversed(parts) for row in part]
     table = pa.Table.from_pylist(
-        [{name: row[name] for name in ROWS.names} for row in rows], schema=ROWS
+        [{name: row[name] for name in SCALABILITY.names} for row in rows], schema=SCALABILITY
     )
     write_table(root / EVALUATION / "scalability.parquet", table)
     write_json(root / METRICS / "scalability.json", summarize(rows))

@@ -3,12 +3,13 @@
 Each configuration is a shard that its worker writes as soon as it is done, outside the outputs
 that DVC deletes before it starts the stage: after a kill, only the shards in progress are redone.
 The name of a shard is a digest of all that it depends on, the source code included. The shards stay
-until another run does not need them: DVC can be killed after the stage has ended.
+until another run does not need them: DVC can be killed after the stage has ended. A shard whose
+files are not those that were written is computed again.
 """
 
 import json
 import logging
-import shutil
+import os
 from collections.abc import Set
 from dataclasses import dataclass
 from functools import cache
@@ -17,12 +18,13 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 import guided_lgp
 from guided_lgp import parallel
 from guided_lgp.bounds.results import CoarseResult
 from guided_lgp.bounds.scene_bounds import SceneBounds
+from guided_lgp.documents import made_whole, remove, write_text
+from guided_lgp.errors import InputError
 from guided_lgp.logic import (
     format_objective,
     format_skeleton,
@@ -34,10 +36,13 @@ from guided_lgp.paths import SCENES, SEQUENCES
 from guided_lgp.scene import Scene, load_scenes
 from guided_lgp.search.enumerate import Enumeration, enumerate_sequences
 from guided_lgp.search.observation import observe, start
-from guided_lgp.sequences import SHORTEST, VERDICTS
-from guided_lgp.tables import write_table
+from guided_lgp.sequences import SHORTEST, STAGE, VERDICTS
+from guided_lgp.tables import read_columns, write_table
 
 SPLITS = ("training", "test")
+_PARTS = {"verdicts": VERDICTS, "shortest": SHORTEST}
+"""The tables of a shard."""
+_DIGESTS = "digests.txt"
 
 logger = logging.getLogger(__name__)
 
@@ -77,7 +82,7 @@ def run(params: Params, root: Path) -> None:
     for name, split in tasks.items():
         for part, suffix in (("verdicts", ""), ("shortest", "_shortest")):
             table = pa.concat_tables(
-                pq.read_table(task.shard / f"{part}.parquet") for task in split
+                read_columns(task.shard / f"{part}.parquet", STAGE, _PARTS[part]) for task in split
             )
             write_table(root / SEQUENCES / f"{name}{suffix}.parquet", table)
             logger.info("%s %s: %d rows", name, part, len(table))
@@ -87,13 +92,16 @@ def _remove_others(folder: Path, shards: Set[Path]) -> None:
     """Remove what earlier runs left: shards of other content, and shards half-written."""
     for found in folder.iterdir() if folder.is_dir() else ():
         if found not in shards:
-            shutil.rmtree(found)
+            remove(found)
 
 
 def write_shard(task: Task) -> None:
     """Enumerate one configuration, unless that has been done before."""
-    if task.shard.exists():
+    if _is_whole(task.shard):
         return
+    if os.path.lexists(task.shard):
+        logger.warning("%s is damaged and computed again", task.shard)
+        remove(task.shard)
     symbols = task.scene.symbols
     found = enumerate_sequences(
         task.scene.state,
@@ -103,10 +111,28 @@ def write_shard(task: Task) -> None:
         task.limits.max_length,
         task.limits.slack,
     )
-    unfinished = task.shard.with_suffix(".unfinished")
-    write_table(unfinished / "verdicts.parquet", verdict_table(task.scene, found))
-    write_table(unfinished / "shortest.parquet", shortest_table(task.scene, found))
-    unfinished.replace(task.shard)
+    try:
+        with made_whole(task.shard) as shard:
+            write_table(shard / "verdicts.parquet", verdict_table(task.scene, found))
+            write_table(shard / "shortest.parquet", shortest_table(task.scene, found))
+            write_text(shard / _DIGESTS, _digests(shard))
+    except InputError:
+        if not _is_whole(task.shard):  # else a worker that was thought lost has been faster
+            raise
+
+
+def _is_whole(shard: Path) -> bool:
+    """Whether a shard has the content that was written."""
+    try:
+        return (shard / _DIGESTS).read_text(encoding="ascii") == _digests(shard)
+    except (OSError, UnicodeDecodeError):
+        return False
+
+
+def _digests(shard: Path) -> str:
+    """A line for each table of a shard."""
+    contents = {part: (shard / f"{part}.parquet").read_bytes() for part in _PARTS}
+    return "".join(f"{sha256(content).hexdigest()} {part}\n" for part, content in contents.items())
 
 
 def verdict_table(scene: Scene, found: Enumeration) -> pa.Table:

@@ -17,6 +17,7 @@ import pyarrow as pa
 from guided_lgp import parallel
 from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.documents import write_json
+from guided_lgp.experiments.outcomes import GENERALIZATION, OUTCOMES
 from guided_lgp.experiments.policies import load_policies
 from guided_lgp.logic import (
     Objective,
@@ -24,7 +25,6 @@ from guided_lgp.logic import (
     format_objective,
     format_skeleton,
     one_goal_objectives,
-    parse_skeleton,
     progress,
     satisfied,
     two_goal_objectives,
@@ -38,36 +38,10 @@ from guided_lgp.search.planners import TABLE_1
 from guided_lgp.search.policy import Policy
 from guided_lgp.search.problem import Problem
 from guided_lgp.search.result import SearchResult
-from guided_lgp.sequences import read_shortest, read_verdicts
+from guided_lgp.sequences import feasible_sequences, read_shortest
 from guided_lgp.tables import write_table
 
 Row = dict[str, Any]
-
-OUTCOMES = ("shortest", "feasible", "no_solution")
-
-ROWS = pa.schema(
-    [
-        ("configuration", pa.string()),
-        ("objective", pa.string()),
-        ("unseen", pa.bool_()),
-        ("planner", pa.string()),
-        ("outcome", pa.string()),
-        ("skeleton", pa.string()),
-        ("length", pa.int32()),
-        ("shortest_length", pa.int32()),
-        ("shortest_has_path", pa.bool_()),
-        ("reattempts_infeasible", pa.int32()),
-        ("reattempts_max_depth", pa.int32()),
-        ("tree_size", pa.int32()),
-        ("expansions", pa.int32()),
-        ("policy_calls", pa.int32()),
-        ("coarse_calls", pa.int32()),
-        ("path_calls", pa.int32()),
-        ("reason", pa.string()),
-    ]
-)
-"""``outcome``: trivial, or one of :data:`OUTCOMES`; ``shortest_has_path``: whether any sequence of
-the shortest length has a path, null if there is no such sequence."""
 
 logger = logging.getLogger(__name__)
 
@@ -80,7 +54,7 @@ class Task:
     seen: tuple[Objective, ...]
     shortest: Mapping[str, int | None]
     """Shortest feasible length by objective."""
-    sequences: tuple[str, ...]
+    sequences: tuple[Skeleton, ...]
     """The feasible sequences that the enumeration found."""
     bounds: BoundsParams
     limits: SearchLimits
@@ -94,7 +68,7 @@ def run(params: Params, root: Path) -> None:
         for part in parallel.run(evaluate, _tasks(params, root), params.parallel, "generalization")
         for row in part
     ]
-    table = pa.Table.from_pylist(rows, schema=ROWS)
+    table = pa.Table.from_pylist(rows, schema=GENERALIZATION)
     write_table(root / EVALUATION / "generalization.parquet", table)
     metrics = summarize(rows)
     write_json(root / METRICS / "generalization.json", metrics)
@@ -107,18 +81,15 @@ def _tasks(params: Params, root: Path) -> list[Task]:
     scenes = load_scenes(root / SCENES / "test.json").scenes
     draw = params.build_dataset
     seen = training_objectives(scenes[0].symbols, draw.training_objectives, draw.seed)
-    lengths = read_shortest(root / SEQUENCES / "test_shortest.parquet")
-    sequences: dict[str, list[str]] = {scene.name: [] for scene in scenes}
-    path = root / SEQUENCES / "test.parquet"
-    for row in read_verdicts(path, "configuration", "skeleton", "feasible").to_pylist():
-        if row["feasible"]:
-            sequences[row["configuration"]].append(row["skeleton"])
+    objectives = one_goal_objectives(scenes[0].symbols) + two_goal_objectives(scenes[0].symbols)
+    lengths = read_shortest(root / SEQUENCES / "test_shortest.parquet", scenes, objectives)
+    sequences = feasible_sequences(root / SEQUENCES / "test.parquet", scenes)
     return [
         Task(
             scene,
             tuple(seen),
-            lengths.get(scene.name, {}),
-            tuple(sequences[scene.name]),
+            lengths[scene.name],
+            sequences[scene.name],
             params.bounds,
             params.evaluate_generalization,
             root / TRAINED,
@@ -132,11 +103,10 @@ def evaluate(task: Task) -> list[Row]:
     symbols = task.scene.symbols
     bounds = SceneBounds(task.scene, task.bounds)
     policies = load_policies(TABLE_1.values(), task.models)
-    known = [parse_skeleton(text) for text in task.sequences]
     return [
         row
         for objective in one_goal_objectives(symbols) + two_goal_objectives(symbols)
-        for row in _problem(task, objective, bounds, policies, known)
+        for row in _problem(task, objective, bounds, policies)
     ]
 
 
@@ -145,7 +115,6 @@ def _problem(
     objective: Objective,
     bounds: Bounds,
     policies: Mapping[str, Policy],
-    known: Sequence[Skeleton],
 ) -> list[Row]:
     shortest = task.shortest[format_objective(objective)]
     problem = {
@@ -174,7 +143,7 @@ def _problem(
     if shortest is not None:
         has_path = shortest in found or any(
             bounds.path(skeleton).feasible
-            for skeleton in known
+            for skeleton in task.sequences
             if len(skeleton) == shortest
             and satisfied(progress(task.scene.state, skeleton), objective)
         )

@@ -52,3 +52,16 @@ def read_tensors(path: Path, remedy: str, digest: str | None = None) -> dict[str
         # All but the first: a type of numbers that NumPy does not have, such as bfloat16.
         raise InputError(str(path), "is damaged", remedy) from None
     return arrays
+
+
+def read_weights(path: Path, remedy: str) -> dict[str, NDArray[np.float32]]:
+    """Read the weights of a network.
+
+    Raises:
+        InputError: see :func:`read_tensors`; or one of them is not of finite numbers of 32 bits.
+    """
+    weights = read_tensors(path, remedy)
+    for name, array in weights.items():
+        if array.dtype != np.float32 or not np.isfinite(array).all():
+            raise InputError(f"{path}: {name}", "is not of finite numbers of 32 bits", remedy)
+    return weights

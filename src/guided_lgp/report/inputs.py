@@ -1,20 +1,24 @@
 """What the report is made from: metrics, verdicts, problems and scenes, read and checked."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
+import pyarrow as pa
 
 from guided_lgp.documents import read_json
 from guided_lgp.errors import InputError
+from guided_lgp.experiments.outcomes import GENERALIZATION, OUTCOMES, SCALABILITY
 from guided_lgp.experiments.problems import PROBLEMS, ProblemClass
+from guided_lgp.logic import format_objective, one_goal_objectives, two_goal_objectives
 from guided_lgp.paths import EVALUATION, METRICS, REPORTS, SCENES, SEQUENCES, TRAINING
 from guided_lgp.report.style import NETWORKS
 from guided_lgp.scene import GeneratedScenes, Scene, load_scenes
-from guided_lgp.search.planners import TABLE_1
-from guided_lgp.tables import read_table
+from guided_lgp.search.planners import TABLE_1, TABLE_3
+from guided_lgp.sequences import read_verdicts
+from guided_lgp.tables import columns_of, read_columns
 
 Metrics = Mapping[str, Any]
 
@@ -26,13 +30,21 @@ _VERDICTS = (
     "failure_action",
     "failure_constraint",
 )
-_OUTCOMES = (
-    *("configuration", "objective", "unseen", "planner"),
-    *("outcome", "length", "policy_calls"),
+_OUTCOMES = columns_of(
+    GENERALIZATION,
+    (
+        *("configuration", "objective", "unseen", "planner"),
+        *("outcome", "length", "policy_calls"),
+    ),
+    ("configuration", "objective", "unseen", "planner", "outcome"),
 )
-_RUNS = (
-    *("problem", "configuration", "objective", "planner"),
-    *("solved", "reason", "skeleton"),
+_RUNS = columns_of(
+    SCALABILITY,
+    (
+        *("problem", "configuration", "objective", "planner"),
+        *("solved", "reason", "skeleton"),
+    ),
+    ("problem", "configuration", "objective", "planner", "solved"),
 )
 _MEANS = (
     "tree_size_mean",
@@ -106,20 +118,22 @@ def load_inputs(root: Path) -> Inputs:
     """
     metrics = root / METRICS
     geometry, spread = metrics / "geometry.json", root / REPORTS / "studies" / "spread.json"
-    verdicts = [
-        _frame(root / SEQUENCES / f"{split}.parquet", "enumerate_sequences", _VERDICTS).assign(
-            split=split
-        )
-        for split in ("training", "test")
-    ]
     generalization = read_object(metrics / "generalization.json", "evaluate_generalization")
     evaluated = {variant.policy for name, variant in TABLE_1.items() if name in generalization}
     stage = "compare_scalability"
-    runs = _frame(root / EVALUATION / "scalability.parquet", stage, _RUNS)
-    scalability = mask_stopped(read_object(metrics / "scalability.json", stage), runs)
+    scalability = read_object(metrics / "scalability.json", stage)
+    scenes = {
+        name: load_scenes(root / SCENES / f"{name}.json")
+        for name in (
+            "training",
+            "test",
+            *(f"scalability_{setup}" for setup in _setups(scalability)),
+        )
+    }
+    runs = _runs(root, scenes, scalability)
     return Inputs(
         generalization=generalization,
-        scalability=scalability,
+        scalability=mask_stopped(scalability, runs),
         timing=mask_stopped(read_object(metrics / "scalability_timing.json", stage), runs),
         training={
             policy: {
@@ -131,20 +145,48 @@ def load_inputs(root: Path) -> Inputs:
         },
         geometry=read_object(geometry, "make bench") if geometry.exists() else None,
         spread=read_object(spread, "make study") if spread.exists() else None,
-        scenes={
-            name: load_scenes(root / SCENES / f"{name}.json")
-            for name in (
-                "training",
-                "test",
-                *(f"scalability_{setup}" for setup in _setups(scalability)),
-            )
-        },
-        verdicts=pd.concat(verdicts, ignore_index=True),
-        problems=_frame(
-            root / EVALUATION / "generalization.parquet", "evaluate_generalization", _OUTCOMES
-        ),
+        scenes=scenes,
+        verdicts=_verdicts(root, scenes),
+        problems=_problems(root, scenes["test"]),
         runs=runs,
     )
+
+
+def _verdicts(root: Path, scenes: Mapping[str, GeneratedScenes]) -> pd.DataFrame:
+    frames = []
+    for split in ("training", "test"):
+        path = root / SEQUENCES / f"{split}.parquet"
+        table = read_verdicts(path, *_VERDICTS, of=scenes[split].scenes)
+        frames.append(_frame(table).assign(split=split))
+    return pd.concat(frames, ignore_index=True)
+
+
+def _problems(root: Path, test: GeneratedScenes) -> pd.DataFrame:
+    symbols = test.scenes[0].symbols
+    objectives = one_goal_objectives(symbols) + two_goal_objectives(symbols)
+    known = {
+        "configuration": {scene.name for scene in test.scenes},
+        "objective": set(map(format_objective, objectives)),
+        "planner": TABLE_1.keys(),
+        "outcome": {"trivial", *OUTCOMES},
+    }
+    path, stage = root / EVALUATION / "generalization.parquet", "evaluate_generalization"
+    return _frame(read_columns(path, stage, _OUTCOMES, known))
+
+
+def _runs(root: Path, scenes: Mapping[str, GeneratedScenes], scalability: Metrics) -> pd.DataFrame:
+    known = {
+        "problem": scalability.keys(),
+        "configuration": {scene.name for part in scenes.values() for scene in part.scenes},
+        "planner": TABLE_3.keys(),
+    }
+    path, stage = root / EVALUATION / "scalability.parquet", "compare_scalability"
+    return _frame(read_columns(path, stage, _RUNS, known))
+
+
+def _frame(table: pa.Table) -> pd.DataFrame:
+    """The table; values that are missing are None, which Arrow's own conversion changes."""
+    return pd.DataFrame(table.to_pylist(), columns=table.column_names)
 
 
 def sub_policies(inputs: Inputs) -> Iterator[tuple[str, str, Metrics]]:
@@ -183,10 +225,6 @@ def mask_stopped(metrics: Metrics, runs: pd.DataFrame) -> Metrics:
         }
         for problem, planners in metrics.items()
     }
-
-
-def _frame(path: Path, stage: str, columns: Sequence[str]) -> pd.DataFrame:
-    return pd.DataFrame(read_table(path, stage, columns), columns=list(columns))
 
 
 def read_object(path: Path, stage: str) -> Metrics:

@@ -103,12 +103,9 @@ def shortest_lengths(root: Path, scenes: Sequence[Scene]) -> Mapping[str, Mappin
     Raises:
         InputError: the output of enumerate_sequences is missing or of other scenes.
     """
-    path = root / SEQUENCES / "test_shortest.parquet"
-    lengths = read_shortest(path)
-    for scene in scenes:
-        if scene.name not in lengths:
-            raise InputError(str(path), f"lacks {scene.name}", "the sequences of the same scenes")
-    return lengths
+    symbols = scenes[0].symbols
+    objectives = one_goal_objectives(symbols) + two_goal_objectives(symbols)
+    return read_shortest(root / SEQUENCES / "test_shortest.parquet", scenes, objectives)
 
 
 def _by_subset(runs: Sequence[Sequence[Row]]) -> dict[str, dict[str, list[float | int]]]:

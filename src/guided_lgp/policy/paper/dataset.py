@@ -161,6 +161,9 @@ def _fault(samples: dict[str, Any], encoding: Encoding, configurations: int) -> 
     """What is wrong with arrays that were read, if anything is."""
     if set(samples) != set(_ARRAYS):
         return f"has the arrays {', '.join(sorted(samples))}"
+    for name, array in samples.items():
+        if not array.ndim:
+            return f"{name}: is a single number"
     states, goals = len(samples["states"]), len(samples["goals"])
     widths = {
         "states": (encoding.state_size,),

@@ -5,13 +5,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from guided_lgp.documents import read_json, write_json
 from guided_lgp.errors import InputError
 from guided_lgp.policy.arrays import FloatArray
 from guided_lgp.policy.paper.encoding import VERSION, Encoding
-from guided_lgp.policy.tensors import read_tensors, write_tensors
+from guided_lgp.policy.tensors import read_weights, write_tensors
 
 Layers = tuple[tuple[FloatArray, FloatArray], ...]
 """Weight (outputs, inputs) and bias (outputs,) of every layer of a sub-policy."""
@@ -71,7 +69,7 @@ def load_model(directory: Path, network: str, stage: str = "train_policy") -> Mo
     if sizes is None:
         raise InputError(f"{path}: sub_policies", "do not fit the network's chain", remedy)
     path = directory / f"{network}.safetensors"
-    tensors = read_tensors(path, remedy)
+    tensors = read_weights(path, remedy)
     sub_policies = {}
     for name, widths in sizes.items():
         layers = []
@@ -80,11 +78,6 @@ def load_model(directory: Path, network: str, stage: str = "train_policy") -> Mo
             bias = tensors.get(f"{name}.{index}.bias")
             if weight is None or bias is None or (weight.shape, bias.shape) != (shape, shape[:1]):
                 fault = f"does not have the {shape[0]} × {shape[1]} weights that its JSON names"
-                raise InputError(f"{path}: {name}.{index}", fault, remedy)
-            if any(
-                part.dtype != np.float32 or not np.isfinite(part).all() for part in (weight, bias)
-            ):
-                fault = "has weights that are not finite numbers of 32 bits"
                 raise InputError(f"{path}: {name}.{index}", fault, remedy)
             layers.append((weight, bias))
         sub_policies[name] = tuple(layers)

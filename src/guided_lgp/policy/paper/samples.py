@@ -318,12 +318,9 @@ def _shortest_lengths(
     path: Path, scenes: Sequence[Scene], objectives: Sequence[Objective]
 ) -> FloatArray:
     """(scenes, objectives) shortest feasible lengths; NaN where there is none."""
-    lengths = read_shortest(path)
-    values = np.full((len(scenes), len(objectives)), np.nan, dtype=np.float32)
-    for row, scene in enumerate(scenes):
-        own = lengths.get(scene.name, {})
-        for column, text in enumerate(map(format_objective, objectives)):
-            if text not in own:
-                raise InputError(str(path), f"lacks {scene.name} {text}", _ENUMERATION)
-            values[row, column] = np.nan if own[text] is None else own[text]
-    return values
+    lengths = read_shortest(path, scenes, objectives)
+    values = [
+        [lengths[scene.name][format_objective(objective)] for objective in objectives]
+        for scene in scenes
+    ]
+    return np.array(values, dtype=np.float32)  # None becomes NaN

@@ -17,7 +17,7 @@ from guided_lgp.logic import Domain
 from guided_lgp.policy.arrays import BoolArray, FloatArray
 from guided_lgp.policy.relational.encoding import EDGE_FEATURES, NODE_FEATURES, Graphs, Range
 from guided_lgp.policy.relational.heads import Head, heads
-from guided_lgp.policy.tensors import read_tensors, write_tensors
+from guided_lgp.policy.tensors import read_weights, write_tensors
 
 VERSION = 1
 NAME = "relational"
@@ -213,11 +213,8 @@ def load_weights(directory: Path) -> Weights:
     limits = Range(tuple(document.limits.lower), tuple(document.limits.upper))
     domain = load_domain(document.domain)
     path = directory / f"{NAME}.safetensors"
-    tensors = read_tensors(path, _REMEDY)
+    tensors = read_weights(path, _REMEDY)
     expected = shapes(document.width, document.rounds, heads(domain))
     if {name: tensor.shape for name, tensor in tensors.items()} != expected:
         raise InputError(str(path), "does not have the weights that its JSON describes", _REMEDY)
-    if not all(np.isfinite(tensor).all() for tensor in tensors.values()):
-        raise InputError(str(path), "has weights that are not finite", _REMEDY)
-    tensors = {name: tensor.astype(np.float32) for name, tensor in tensors.items()}
     return Weights(limits, tensors, domain)
