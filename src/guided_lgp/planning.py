@@ -147,7 +147,9 @@ def plan(
     limits = _limits(params.compare_scalability, scene, goals, max_nodes)
     search, followed = _guidance(planner, policy, models, scene)
     observed = ObservedBounds(scene_bounds)
-    attempts = _Attempts(Problem(scene, goals, limits, observed, followed, deadline=deadline))
+    attempts = _Attempts(
+        Problem(scene, goals, limits, observed, followed, parts=scene_bounds, deadline=deadline)
+    )
     if chosen:
         return attempts.result(search.plan(attempts.first))
     widened = partial(attempts.widened, params.bounds)
@@ -166,8 +168,9 @@ class _Attempts:
         scene = widened_scene(problem.scene, problem.objective, params, problem.deadline)
         if scene is None:
             return None
-        bounds = ObservedBounds(SceneBounds(scene, params, problem.deadline))
-        self._last = replace(problem, scene=scene, bounds=bounds, policy=Uniform())
+        bounds = SceneBounds(scene, params, problem.deadline)
+        observed = ObservedBounds(bounds)
+        self._last = replace(problem, scene=scene, bounds=observed, parts=bounds, policy=Uniform())
         return self._last
 
     def result(self, found: SearchResult) -> PlanningResult:
@@ -233,6 +236,8 @@ def _without_search(
         expansions=0,
         policy_calls=0,
         coarse_calls=0,
+        infeasible_calls=0,
+        part_calls=0,
         path_calls=0,
         causes=(),
         reattempts={},

@@ -4,12 +4,17 @@ from functools import cached_property
 
 from guided_lgp.bounds.coarse import CoarseBound, check_terms
 from guided_lgp.bounds.coarse.facts import Facts
+from guided_lgp.bounds.coarse.pairs import Pairs
+from guided_lgp.bounds.coarse.parts import Boxes, Parts
 from guided_lgp.bounds.deadline import NEVER, Deadline
 from guided_lgp.bounds.path import PathBound, check_motions
 from guided_lgp.bounds.results import CoarseResult, PathResult
 from guided_lgp.logic import Skeleton
 from guided_lgp.params import BoundsParams
 from guided_lgp.scene import Scene
+
+_PATIENCE = 3
+"""How many times the starts a part of a scene gets: its "no" holds for all else that is tried."""
 
 
 class SceneBounds:
@@ -28,6 +33,8 @@ class SceneBounds:
         self._coarse_bound = CoarseBound(scene, params.coarse_tries, deadline=deadline)
         self._path_solutions = params.path_solutions
         self._deadline = deadline
+        self._parts = Parts(scene, _PATIENCE * params.coarse_tries, self.facts, deadline)
+        self._pairs = Pairs(scene, self.coarse, self.part)
         self._coarse: dict[Skeleton, CoarseResult] = {}
         self._path: dict[Skeleton, PathResult] = {}
 
@@ -41,12 +48,27 @@ class SceneBounds:
         result = self._coarse.get(skeleton)
         if result is None:
             prefix = self.coarse(skeleton[:-1]) if len(skeleton) > 1 else None
-            if prefix is not None and not prefix.feasible:
-                result = CoarseResult(skeleton, feasible=False, failure=prefix.failure, restarts=0)
-            else:
-                result = self._coarse_bound.solve(skeleton, prefix)
-            self._coarse[skeleton] = result
+            result = self._coarse[skeleton] = self._verdict(skeleton, prefix)
         return result
+
+    def _verdict(self, skeleton: Skeleton, prefix: CoarseResult | None) -> CoarseResult:
+        if prefix is None:
+            failure = None
+        elif prefix.feasible:
+            failure = self._pairs.impossible(skeleton)
+        else:
+            failure = prefix.failure
+        if failure is not None:
+            return CoarseResult(skeleton, feasible=False, failure=failure, restarts=0)
+        return self._coarse_bound.solve(skeleton, prefix)
+
+    def part(self, boxes: Boxes, skeleton: Skeleton) -> CoarseResult:
+        """The coarse bound with some boxes alone; see :class:`Parts`."""
+        return self._parts.solve(boxes, skeleton)
+
+    def out_of_reach(self, skeleton: Skeleton) -> bool:
+        """Whether it is proved that an arm cannot reach what the last action asks of it."""
+        return self.facts.impossible(skeleton) is not None
 
     def path(self, skeleton: Skeleton) -> PathResult:
         """The verified motion for the whole skeleton, or why there is none."""

@@ -1,4 +1,4 @@
-"""What a planner needs of the NLP: the two bounds, as a protocol."""
+"""What a planner needs of the NLP: the two bounds, and what is known before they are asked."""
 
 from typing import Protocol
 
@@ -19,3 +19,27 @@ class Bounds(Protocol):
     def path(self, skeleton: Skeleton) -> PathResult:
         """P(a_1:K) (paper, eq. 4)."""
         ...
+
+
+class Parts(Protocol):
+    """What small parts of a scene say about the whole, for the searches that make use of it."""
+
+    def out_of_reach(self, skeleton: Skeleton) -> bool:
+        """Whether it is proved that an arm cannot reach what the last action of a sequence asks."""
+        ...
+
+    def part(self, boxes: frozenset[str], skeleton: Skeleton) -> CoarseResult:
+        """P_coarse of what is done with some boxes, the others being absent."""
+        ...
+
+
+class NoParts:
+    """Parts that say nothing about the whole."""
+
+    def out_of_reach(self, skeleton: Skeleton) -> bool:
+        """See :class:`Parts`."""
+        return False
+
+    def part(self, boxes: frozenset[str], skeleton: Skeleton) -> CoarseResult:
+        """See :class:`Parts`."""
+        return CoarseResult(skeleton, feasible=True)

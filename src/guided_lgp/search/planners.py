@@ -46,6 +46,14 @@ SEARCHES: Mapping[str, Search] = {
     "breadth-first": Search("breadth_first:plan", "without a policy, as the original LGP"),
     "graph": Search("graph:plan", "breadth-first over distinct states"),
     "astar": Search("best_first:plan_shortest", "A* with landmark-cut, without a policy"),
+    "facts": Search("best_first:plan_with_facts", "A* with facts of the geometry"),
+    "facts-tuned": Search("best_first:plan_tuned", "facts, with a hand-made estimate"),
+    "conflicts": Search(
+        "best_first:plan_with_conflicts", "without a policy, learning from what is infeasible"
+    ),
+    "informed": Search(
+        "best_first:plan_informed", "best-first, with facts of the geometry", follows_policy=True
+    ),
 }
 """Every search, by the name under which users ask for it."""
 

@@ -1,13 +1,13 @@
 """What a planner is given."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from guided_lgp.bounds.deadline import NEVER, Deadline
 from guided_lgp.logic import Objective, Symbols, validate_objective
 from guided_lgp.params import SearchLimits
 from guided_lgp.scene import Scene
-from guided_lgp.search.bounds import Bounds
+from guided_lgp.search.bounds import Bounds, NoParts, Parts
 from guided_lgp.search.policy import Policy
 
 
@@ -29,6 +29,8 @@ class Problem:
     """Objective adaptation: the policy sees only the goals that do not hold yet (Sec. III-A)."""
     restriction: Symbols | None = None
     """The symbols that actions may name, if not all of the scene."""
+    parts: Parts = field(default_factory=NoParts)
+    """For the searches that make use of it."""
 
     deadline: Deadline = NEVER
     """When the search ends, for users."""

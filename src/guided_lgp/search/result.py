@@ -4,6 +4,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import astuple, dataclass, replace
+from functools import partial
 from typing import Literal, TypeVar
 
 from guided_lgp.bounds.deadline import OutOfTimeError
@@ -64,6 +65,10 @@ class SearchResult:
     expansions: int
     policy_calls: int
     coarse_calls: int
+    infeasible_calls: int
+    """Of the coarse calls, those with a verdict against the sequence ..."""
+    part_calls: int
+    """... and those with some of the boxes alone, for what follows for the whole scene."""
     path_calls: int
     causes: tuple[Cause, ...]
     """Why each failed attempt ended, in order; empty for searches without attempts."""
@@ -105,7 +110,14 @@ def joined(first: SearchResult, second: SearchResult) -> SearchResult:
     return replace(second, **both, times=Times(*times))
 
 
-_COUNTS = ("tree_size", "expansions", "policy_calls", "coarse_calls", "path_calls", "causes")
+_COUNTS = (
+    *("tree_size", "expansions", "policy_calls", "coarse_calls", "infeasible_calls"),
+    *("part_calls", "path_calls", "causes"),
+)
+
+
+Call = Skeleton | tuple[frozenset[str], Skeleton]
+"""What the coarse bound is asked: a sequence, with all boxes or with some alone."""
 
 
 class Run:
@@ -113,6 +125,7 @@ class Run:
 
     def __init__(self, problem: Problem) -> None:
         self._bounds = problem.bounds
+        self._part = problem.parts.part
         self._policy = problem.policy
         self._limits = problem.limits
         self._deadline = problem.deadline
@@ -120,7 +133,7 @@ class Run:
         self._start = time.perf_counter()
         self._waited = 0.0
         self._policy_s = self._coarse_s = self._path_s = 0.0
-        self._asked: dict[Skeleton, CoarseResult] = {}
+        self._asked: dict[Call, CoarseResult] = {}
         self._path_calls = self._policy_calls = 0
         self._failure: Failure | None = None
         self.failed: Skeleton = ()
@@ -144,13 +157,26 @@ class Run:
                 break
         return result
 
+    def part(self, boxes: frozenset[str], skeleton: Skeleton) -> CoarseResult:
+        """P_coarse of a sequence with some boxes alone, its prefixes first: calls as any other."""
+        for length in range(1, len(skeleton) + 1):
+            prefix = skeleton[:length]
+            result = self._counted((boxes, prefix), partial(self._part, boxes), prefix)
+            if not result.feasible:
+                break
+        return result
+
     def _verdict(self, skeleton: Skeleton) -> CoarseResult:
-        result = self._asked.get(skeleton)
+        return self._counted(skeleton, self._bounds.coarse, skeleton)
+
+    def _counted(
+        self, call: Call, bound: Callable[[Skeleton], CoarseResult], skeleton: Skeleton
+    ) -> CoarseResult:
+        result = self._asked.get(call)
         if result is None:
             start = time.perf_counter()
-            result = self._asked[skeleton] = self._in_time(
-                self._bounds.coarse, CoarseResult(skeleton, feasible=False, restarts=0)
-            )
+            none = CoarseResult(skeleton, feasible=False, restarts=0)
+            result = self._asked[call] = self._in_time(bound, none)
             self._waited += time.perf_counter() - start
             self._coarse_s += result.time_s
         return result
@@ -232,6 +258,8 @@ class Run:
             expansions=self.expansions,
             policy_calls=self._policy_calls,
             coarse_calls=len(self._asked),
+            infeasible_calls=sum(not verdict.feasible for verdict in self._asked.values()),
+            part_calls=sum(isinstance(call[0], frozenset) for call in self._asked),
             path_calls=self._path_calls,
             causes=tuple(self._causes),
             reattempts={cause: followed.count(cause) for cause in causes},

@@ -19,7 +19,7 @@ from guided_lgp.bounds.terms.term import UngraspableError
 from guided_lgp.bounds.verify import verify_keyframes
 from guided_lgp.logic import Skeleton, format_skeleton
 from guided_lgp.scene import Scene
-from guided_lgp.scene.world import world_of
+from guided_lgp.scene.world import World, world_of
 
 
 @dataclass(frozen=True)
@@ -43,18 +43,29 @@ class CoarseBound:
         restarts: int,
         solver: Solver | None = None,
         deadline: Deadline = NEVER,
+        facts: Facts | None = None,
+        world: World | None = None,
     ) -> None:
-        """Prepare a scene; ``restarts`` is the number of starts before giving up."""
+        """Prepare a scene.
+
+        Args:
+            scene: the scene.
+            restarts: the number of starts before giving up.
+            solver: if not the default one.
+            deadline: when to give up in any case.
+            facts: of this scene or one with more boxes, if there are some already.
+            world: of this scene, if there is one already.
+        """
         self.scene = scene
         self._restarts = restarts
         self._deadline = deadline
         self._solver = solver or default_solver(scene.robot.description)
         self._geometry = SceneGeometry(scene)
-        self.facts = Facts(self._geometry)
+        self.facts = facts or Facts(self._geometry)
         self._starts = Starts(self._geometry, self._solver)
         self._decoder = Decoder(self._geometry)
         self._settings = Settings()
-        self._world = world_of(scene)
+        self._world = world or world_of(scene)
 
     def solve(self, skeleton: Skeleton, prefix: CoarseResult | None = None) -> CoarseResult:
         """The verdict on a skeleton.
