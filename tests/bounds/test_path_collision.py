@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from motions import scene
 
-from guided_lgp.bounds.path.collision import CollisionChecker, PlanningScene
+from guided_lgp.bounds.collision import CollisionChecker, PlanningScene
 from guided_lgp.poses import compose, inverse, pose
 from guided_lgp.scene.world import World, initial_poses
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from motions import scene
 
-from guided_lgp.bounds.path.collision import PlanningScene
+from guided_lgp.bounds.collision import PlanningScene
 from guided_lgp.bounds.path.motions import Motion, Mover, Surroundings, Tool, Transit
 from guided_lgp.bounds.path.optimise import LEVEL, optimise
 from guided_lgp.bounds.path.situation import Fingers

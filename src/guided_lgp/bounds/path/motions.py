@@ -8,8 +8,8 @@ from itertools import pairwise
 import numpy as np
 
 from guided_lgp.bounds.checks import body_names, overlap_name
+from guided_lgp.bounds.collision import PlanningScene, checker_of
 from guided_lgp.bounds.deadline import NEVER, Deadline
-from guided_lgp.bounds.path.collision import CollisionChecker, PlanningScene
 from guided_lgp.bounds.path.connect import connect, shortcut
 from guided_lgp.bounds.path.spaces import (
     JointSpace,
@@ -95,7 +95,7 @@ class Mover:
         self.robot = scene.robot.description
         self.arms = {g: PlacedArm(self.robot, g, base, fixed) for g in self.robot.grippers}
         self._bodies = body_names(scene)
-        self._checker = CollisionChecker(scene)
+        self._checker = checker_of(scene)
         self._entered: tuple[Surroundings, JointSpace] | None = None
         self._iterations = iterations
         self._deadline = deadline
@@ -208,8 +208,9 @@ class Mover:
     def _space(self, surroundings: Surroundings) -> JointSpace:
         """The space of a motion; the checker is there already if it was the last one asked for."""
         self._deadline.check()
-        if self._entered is None or self._entered[0] is not surroundings:
+        if self._checker.entered is not surroundings.scene:
             self._checker.enter(surroundings.scene)
+        if self._entered is None or self._entered[0] is not surroundings:
             arm = self.arms[surroundings.scene.gripper]
             space = JointSpace(self._checker, arm, surroundings.q, surroundings.fingers)
             self._entered = surroundings, space

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pinocchio as pin
 
-from guided_lgp.bounds.path.collision import PlanningScene
+from guided_lgp.bounds.collision import PlanningScene
 from guided_lgp.bounds.path.motions import Motion, Surroundings
 from guided_lgp.bounds.results import Array, Keyframe
 from guided_lgp.logic import State

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from guided_lgp.bounds.path.collision import CollisionChecker
+from guided_lgp.bounds.collision import CollisionChecker
 from guided_lgp.bounds.results import Array
 from guided_lgp.robots import PlacedArm
 

@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from guided_lgp.bounds.checks import Violation, body_names, box_sizes, overlap_name
+from guided_lgp.bounds.collision import PlanningScene, checker_of
 from guided_lgp.bounds.results import Array, Trajectory
 from guided_lgp.bounds.verify.attachments import switches_of
 from guided_lgp.bounds.verify.geometry import declared, grasp_faults, placement_faults
@@ -15,6 +16,8 @@ from guided_lgp.logic import Skeleton, State, successor
 from guided_lgp.scene.tolerances import MARGIN
 from guided_lgp.scene.world import World, initial_poses
 
+JUDGED = 10
+"""PyBullet judges at least every so-many-th configuration: steps of at most 10 cm."""
 START = 1e-3
 """How far (rad) the first configuration may be off all arms at their side."""
 
@@ -38,7 +41,8 @@ def verify_path(world: World, skeleton: Skeleton, trajectory: Trajectory) -> Pat
     stays within the limits of position, velocity and acceleration; grasps and places happen in
     the skeleton's order, each with the gripper really at the box and the box properly on its
     support; boxes move only with a gripper; nothing collides on the way, looked at in steps of
-    at most 1 cm of the fastest point; and at the end every box is where the skeleton leaves it.
+    at most 1 cm of the fastest point (see :class:`_Collisions`); and at the end every box is
+    where the skeleton leaves it.
 
     Args:
         world: of the scene.
@@ -87,11 +91,16 @@ def _walk(
 
 
 class _Collisions:
-    """Looks for collisions and counts."""
+    """Looks for collisions and counts.
+
+    PyBullet judges every ``JUDGED``-th configuration, those in which fingers move, and those that
+    are not surely free by the bodies' convex hulls with a padding: elsewhere nothing touches.
+    """
 
     def __init__(self, world: World) -> None:
         self._world = world
         self._robot = world.scene.robot.description
+        self._checker = checker_of(world.scene)
         self.checked = 0
         """Configurations so far."""
         self.deepest = 0.0
@@ -100,8 +109,8 @@ class _Collisions:
     def first_fault(self, phase: Phase, before: State, after: State) -> Violation | None:
         """The first collision of a phase, between the modes before and after it."""
         touches, support = phase.touches(before, after), dict(phase.state.support)
-        for sample in range(len(phase.q)):
-            self.checked += 1
+        self.checked += len(phase.q)
+        for sample in self._judged(phase):
             for overlap in phase.overlaps(self._world, sample):
                 if declared(overlap, self._robot, touches[sample], support):
                     continue
@@ -113,6 +122,21 @@ class _Collisions:
                     return Violation(name, overlap.depth, time=float(phase.times[sample]))
                 break  # they come deepest first
         return None
+
+    def _judged(self, phase: Phase) -> list[int]:
+        """The samples that PyBullet judges."""
+        robot, first = self._robot, phase.boxes_at(0)
+        standing = {box: pose for box, pose in first.items() if box not in phase.grips}
+        held = frozenset(frozenset(pair) for pair in phase.state.held)
+        grippers = robot.grippers
+        self._checker.enter(
+            PlanningScene(grippers[0], standing, phase.grips, held, frozenset(grippers[1:]))
+        )
+        judged = ~self._checker.certified(phase.q)
+        judged[::JUDGED] = judged[-1] = True
+        fingers = phase.q[:, len(robot.joint_names) :]
+        judged[1:] |= np.any(np.diff(fingers, axis=0), axis=1)
+        return np.flatnonzero(judged).tolist()
 
 
 def _contact_fault(phase: Phase, after: State) -> Violation | None:

@@ -36,19 +36,20 @@ class Phase:
         self._arms = len(robot.joint_names)
         self._start = dict(boxes)
         tools = scene.robot.tool_poses(q[:1, : self._arms])
-        self._grips: dict[str, tuple[str, Array]] = {}
+        self.grips: dict[str, tuple[str, Array]] = {}
+        """Gripper, and pose (7,) in its tool frame, of every box that moves with one."""
         for held, gripper in state.held:
             for box in (held, *state.carried_by(held)):
-                self._grips[box] = gripper, compose(inverse(tools[gripper][0]), boxes[box])
+                self.grips[box] = gripper, compose(inverse(tools[gripper][0]), boxes[box])
         reach = {gripper: arm.hand_radius for gripper, arm in robot.arms.items()}
         sizes = box_sizes(scene)
-        for box, (gripper, grip) in self._grips.items():
+        for box, (gripper, grip) in self.grips.items():
             corners = apply(grip, np.array(sizes[box]) / 2 * _CORNERS)
             reach[gripper] = max(reach[gripper], float(np.linalg.norm(corners, axis=1).max()))
         self.q, self.times = resample(scene, q, times, reach)
         self._tools = scene.robot.tool_poses(self.q[:, : self._arms])
         self._moving = {
-            box: compose(self._tools[gripper], grip) for box, (gripper, grip) in self._grips.items()
+            box: compose(self._tools[gripper], grip) for box, (gripper, grip) in self.grips.items()
         }
 
     def boxes_at(self, sample: int) -> dict[str, Array]:

@@ -28,12 +28,13 @@ def link_hulls(urdf: Path) -> dict[str, tuple[Array, ...]]:
     for shape in shapes.geometryObjects:
         frame = model.frames[shape.parentFrame]
         placement = frame.placement.actInv(shape.placement)
-        vertices = _vertices(shape.geometry) @ placement.rotation.T + placement.translation
+        vertices = shape_vertices(shape.geometry) @ placement.rotation.T + placement.translation
         hulls.setdefault(frame.name, []).append(vertices)
     return {link: tuple(vertices) for link, vertices in hulls.items()}
 
 
-def _vertices(shape: Any) -> Array:
+def shape_vertices(shape: Any) -> Array:
+    """Vertices (n, 3) in its own frame (m) of a polyhedron that a shape of coal's fills at most."""
     import coal
 
     if isinstance(shape, coal.BVHModelBase):

@@ -1,12 +1,13 @@
 """Collision checks for planning: convex hulls of the robot's meshes, boxes and tables, in coal.
 
 The hulls are those that PyBullet makes of the same files, so that its verdict at the end agrees.
-A check takes about 10 us: forward kinematics, bounding boxes of all bodies, then exact tests.
+A check takes about 10 us: forward kinematics, bounding boxes of all bodies, then exact tests. What
+is certified as free needs none.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from guided_lgp.bounds.collision.certificate import Certificate
 from guided_lgp.bounds.results import Array
 from guided_lgp.poses import IDENTITY, pose
 from guided_lgp.robots import Arm
@@ -23,6 +25,8 @@ from guided_lgp.scene.world import TABLE_THICKNESS
 
 PADDING = 0.003
 """Distance (m) that everything keeps from everything, declared contacts apart."""
+_FEW = 3
+"""Configurations that are checked one by one: a certificate for them costs as much."""
 
 
 @dataclass(frozen=True)
@@ -37,10 +41,19 @@ class PlanningScene:
     """Gripper, and pose (7,) in its tool frame, of every box held or standing on a held one."""
     touching: frozenset[frozenset[str]] = frozenset()
     """Declared contacts: pairs of boxes, tables and grippers (meaning the hand)."""
+    also: frozenset[str] = frozenset()
+    """Other grippers whose arms move as well."""
+
+    @property
+    def moving(self) -> frozenset[str]:
+        """All grippers whose arms move."""
+        return self.also | {self.gripper}
 
 
-_Pattern = tuple[str, frozenset[str], frozenset[tuple[str, str]], frozenset[frozenset[str]]]
-"""What decides which pairs are checked: moving arm, standing and carried boxes, contacts."""
+_Pattern = tuple[
+    frozenset[str], frozenset[str], frozenset[tuple[str, str]], frozenset[frozenset[str]]
+]
+"""What decides which pairs are checked: moving arms, standing and carried boxes, contacts."""
 
 
 class CollisionChecker:
@@ -90,9 +103,12 @@ class CollisionChecker:
             self._model, self._geometry, self._geometry_data
         )
         self._callback = pin.CollisionCallBackDefault(self._geometry, self._geometry_data, True)
+        self.entered: PlanningScene | None = None
+        """The scene that is there."""
         self._pattern: _Pattern | None = None
         self._patterns: dict[_Pattern, tuple[NDArray[np.bool_], list[int]]] = {}
         self._active: list[int] = []
+        self._apart = np.empty((0, 2), dtype=np.intc)
         self.queries = 0
         """Calls of :meth:`first_collision` so far."""
         self._template = pin.neutral(self._model)
@@ -106,6 +122,10 @@ class CollisionChecker:
             int(self._model.joints[self._model.getJointId(joint)].idx_v)
             for joint in robot.joint_names
         ]
+        self._certificate = Certificate(
+            self._model, self._template, self._geometry, robot.moving_joints
+        )
+        self._moving = len(robot.moving_joints)
         self._fingers = {gripper: arm.fingers for gripper, arm in robot.arms.items()}
         self._finger_at = {
             gripper: np.array([self._coordinate(joint) for joint in fingers.joints], dtype=int)
@@ -117,13 +137,14 @@ class CollisionChecker:
 
         A box that the scene does not mention is nowhere.
         """
+        self.entered = scene
         for box, placement in scene.standing.items():
             self._move(box, 0, pin.XYZQUATToSE3(placement))
         for box, (gripper, grasp) in scene.carried.items():
             joint, tool = self._tool[gripper]
             self._move(box, joint, tool * pin.XYZQUATToSE3(grasp))
         pattern = (
-            scene.gripper,
+            scene.moving,
             frozenset(scene.standing),
             frozenset((box, gripper) for box, (gripper, _) in scene.carried.items()),
             scene.touching,
@@ -134,20 +155,26 @@ class CollisionChecker:
                 self._patterns[pattern] = active, np.flatnonzero(active[self._pairs]).tolist()
             self._pattern = pattern
             active, self._active = self._patterns[pattern]
+            self._apart = np.stack(self._pairs, axis=1)[self._active].astype(np.intc)
             self._geometry_data.setActiveCollisionPairs(self._geometry, active, True)
 
     def _active_pairs(self, scene: PlanningScene) -> NDArray[np.bool_]:
         """Pairs of shapes of which one moves, but for declared contacts and what moves together."""
-        carried = [
-            number
-            for box, (gripper, _) in scene.carried.items()
-            for number in self._bodies[box]
-            if gripper == scene.gripper
-        ]
+        carried = {
+            gripper: [
+                number
+                for box, (carrier, _) in scene.carried.items()
+                for number in self._bodies[box]
+                if carrier == gripper
+            ]
+            for gripper in sorted(scene.moving)
+        }
         moves = np.zeros(len(self._names), dtype=bool)
-        moves[[*self._arm[scene.gripper], *carried]] = True
+        for gripper, load in carried.items():
+            moves[[*self._arm[gripper], *load]] = True
         active = self._candidates & (moves[:, None] | moves[None, :])
-        active[np.ix_(carried, carried)] = False
+        for load in carried.values():
+            active[np.ix_(load, load)] = False
         absent = self._boxes - {*scene.standing, *scene.carried}
         nowhere = [number for box in absent for number in self._bodies[box]]
         active[nowhere] = active[:, nowhere] = False
@@ -174,14 +201,29 @@ class CollisionChecker:
         The configurations are visited from coarse to fine: ends, middle, quarters, …
         """
         self.queries += 1
+        rows = np.array(_coarse_to_fine(len(q)))
+        if len(rows) > _FEW:
+            rows = rows[~self.certified(self.moving_joints(q[rows], fingers))]
         coordinates = self.coordinates(q, fingers)
-        for row in _coarse_to_fine(len(q)):
+        for row in rows:
             if pin.computeCollisions(
                 self._model, self._data, self._broad, self._callback, coordinates[row]
             ):
                 pair = self._geometry.collisionPairs[self._callback.collisionPairIndex]
                 return self._names[pair.first], self._names[pair.second]
         return None
+
+    def certified(self, moving: Array) -> NDArray[np.bool_]:
+        """Which rows (m, joints) of all moving joints are surely free; see :class:`Certificate`."""
+        return self._certificate.free(moving, self._apart, PADDING)
+
+    def moving_joints(self, q: Array, fingers: Mapping[str, float]) -> Array:
+        """Rows (m, joints) of all moving joints for configurations (m, n)."""
+        moving = np.empty((len(q), self._moving))
+        moving[:, : q.shape[1]] = q
+        for gripper, hand in self._fingers.items():
+            moving[:, hand.slice] = fingers.get(gripper, 0.0) * hand.ratios
+        return moving
 
     def distances(self, q: Array, fingers: Mapping[str, float], count: int) -> tuple[Array, Array]:
         """The smallest distances of pairs of bodies, to first order.
@@ -238,6 +280,7 @@ class CollisionChecker:
         body = self._geometry.geometryObjects[number]
         body.parentJoint = joint
         body.placement = placement
+        self._certificate.move(number, joint, placement.homogeneous)
 
     def _shapes(self, *links: str) -> list[int]:
         """The collision shapes of links; a link may have any number of them."""
@@ -262,6 +305,15 @@ class CollisionChecker:
             first, second = self._shapes(one), self._shapes(other)
             pairs[np.ix_(first, second)] = pairs[np.ix_(second, first)] = False
         return np.asarray(pairs)
+
+
+@lru_cache(maxsize=1)
+def checker_of(scene: Scene) -> CollisionChecker:
+    """The checker of a scene, for planning and for certificates; kept for the last scene.
+
+    Whoever uses it enters a planning scene first, unless the one it wants is ``entered``.
+    """
+    return CollisionChecker(scene)
 
 
 @cache

@@ -1,0 +1,5 @@
+"""Collisions of the robot, boxes and tables: exact ones, and what is surely free of them."""
+
+from guided_lgp.bounds.collision.checker import PADDING, CollisionChecker, PlanningScene, checker_of
+
+__all__ = ["PADDING", "CollisionChecker", "PlanningScene", "checker_of"]

@@ -1,0 +1,236 @@
+/* Which configurations are surely free of collisions: a sufficient test, many configurations at
+ * once. Bodies are convex: an oriented box around each, whose frame hangs on a joint, and vertices
+ * in that frame. Two bodies are apart if their spheres are, or if along the axes of one box the
+ * other box, or the other's vertices, stay away. Loops over lanes are plain; compilers vectorise.
+ */
+#include <math.h>
+
+#define LANES 16 /* configurations at once */
+
+/* One library for all machines: the loader picks the widest vectors that the processor has. */
+#if defined(__x86_64__) && defined(__linux__) && defined(__GNUC__) && !defined(__clang__)
+#define WIDEST __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
+#define INLINE inline __attribute__((always_inline))
+#else
+#define WIDEST
+#define INLINE inline
+#endif
+
+typedef float lanes[LANES];
+
+/* Rotation by rows, then position. */
+typedef struct {
+    lanes entry[12];
+} pose;
+
+typedef struct {
+    int joints;
+    const int *parent;      /* -1: the world */
+    const float *placement; /* 12 per joint, in its parent, at value zero */
+    const float *sine;      /* 9: what the sine of the value adds to the rotation */
+    const float *versine;   /* 9: what one minus its cosine adds */
+    const float *slide;     /* 3: what the value adds to the position */
+    int bodies;
+    const int *joint;
+    const float *frame; /* 12 per body, in its joint: of its oriented box */
+    const float *half;  /* 3 */
+    const int *start;   /* first vertex of a body, and of the one after it */
+    const float *vertices;
+    const float *radius; /* of the sphere about the frame's origin */
+} scene;
+
+static INLINE void joint_pose(const scene *s, int j, const pose *above, const lanes value,
+                       const lanes sine, const lanes versine, pose *out)
+{
+    const float *p = s->placement + 12 * j;
+    for (int r = 0; r < 3; r++)
+        for (int c = 0; c < 3; c++) {
+            int e = 3 * r + c;
+            float fixed = p[e], by_sine = s->sine[9 * j + e], by_versine = s->versine[9 * j + e];
+            for (int l = 0; l < LANES; l++)
+                out->entry[e][l] = fixed + by_sine * sine[l] + by_versine * versine[l];
+        }
+    for (int r = 0; r < 3; r++) {
+        float fixed = p[9 + r], slide = s->slide[3 * j + r];
+        for (int l = 0; l < LANES; l++)
+            out->entry[9 + r][l] = fixed + slide * value[l];
+    }
+    if (!above)
+        return;
+    pose local = *out;
+    for (int r = 0; r < 3; r++) {
+        const float *x = above->entry[3 * r], *y = above->entry[3 * r + 1];
+        const float *z = above->entry[3 * r + 2], *t = above->entry[9 + r];
+        for (int c = 0; c < 3; c++)
+            for (int l = 0; l < LANES; l++)
+                out->entry[3 * r + c][l] = x[l] * local.entry[c][l] +
+                                           y[l] * local.entry[3 + c][l] +
+                                           z[l] * local.entry[6 + c][l];
+        for (int l = 0; l < LANES; l++)
+            out->entry[9 + r][l] = x[l] * local.entry[9][l] + y[l] * local.entry[10][l] +
+                                   z[l] * local.entry[11][l] + t[l];
+    }
+}
+
+static INLINE void body_pose(const float *f, const pose *above, pose *out)
+{
+    for (int r = 0; r < 3; r++)
+        for (int c = 0; c < 4; c++) {
+            int e = c < 3 ? 3 * r + c : 9 + r;
+            if (!above) {
+                for (int l = 0; l < LANES; l++)
+                    out->entry[e][l] = f[e];
+                continue;
+            }
+            const float *x = above->entry[3 * r], *y = above->entry[3 * r + 1];
+            const float *z = above->entry[3 * r + 2], *t = above->entry[9 + r];
+            float a = c < 3 ? f[c] : f[9], b = c < 3 ? f[3 + c] : f[10];
+            float d = c < 3 ? f[6 + c] : f[11], shift = c < 3 ? 0.0f : 1.0f;
+            for (int l = 0; l < LANES; l++)
+                out->entry[e][l] = x[l] * a + y[l] * b + z[l] * d + shift * t[l];
+        }
+}
+
+/* near: 1 where the spheres of two bodies come closer than the padding. Returns whether any do. */
+static INLINE int spheres_near(const pose *a, const pose *b, float reach, int *near)
+{
+    int any = 0;
+    for (int l = 0; l < LANES; l++) {
+        float x = b->entry[9][l] - a->entry[9][l], y = b->entry[10][l] - a->entry[10][l];
+        float z = b->entry[11][l] - a->entry[11][l];
+        near[l] = !(x * x + y * y + z * z > reach * reach);
+        any |= near[l];
+    }
+    return any;
+}
+
+/* Pose of b in the frame of a. */
+static INLINE void relative(const pose *a, const pose *b, pose *out)
+{
+    for (int r = 0; r < 3; r++) {
+        const float *x = a->entry[r], *y = a->entry[3 + r], *z = a->entry[6 + r];
+        for (int c = 0; c < 3; c++)
+            for (int l = 0; l < LANES; l++)
+                out->entry[3 * r + c][l] = x[l] * b->entry[c][l] + y[l] * b->entry[3 + c][l] +
+                                           z[l] * b->entry[6 + c][l];
+        for (int l = 0; l < LANES; l++)
+            out->entry[9 + r][l] = x[l] * (b->entry[9][l] - a->entry[9][l]) +
+                                   y[l] * (b->entry[10][l] - a->entry[10][l]) +
+                                   z[l] * (b->entry[11][l] - a->entry[11][l]);
+    }
+}
+
+/* Clear near where a box around the origin and an interval along its axes are apart. */
+static INLINE void separate(lanes low[3], lanes high[3], const float *half, float padding, int *near)
+{
+    for (int l = 0; l < LANES; l++) {
+        float apart = 0;
+        for (int r = 0; r < 3; r++) {
+            float above = low[r][l] - half[r], below = -half[r] - high[r][l];
+            float gap = above > below ? above : below;
+            gap = gap > 0 ? gap : 0;
+            apart += gap * gap;
+        }
+        near[l] &= !(apart > padding * padding);
+    }
+}
+
+static INLINE void boxes(const pose *b, const float *half_a, const float *half_b, float padding,
+                  int *near)
+{
+    lanes low[3], high[3];
+    for (int r = 0; r < 3; r++)
+        for (int l = 0; l < LANES; l++) {
+            float width = fabsf(b->entry[3 * r][l]) * half_b[0] +
+                          fabsf(b->entry[3 * r + 1][l]) * half_b[1] +
+                          fabsf(b->entry[3 * r + 2][l]) * half_b[2];
+            low[r][l] = b->entry[9 + r][l] - width;
+            high[r][l] = b->entry[9 + r][l] + width;
+        }
+    separate(low, high, half_a, padding, near);
+}
+
+static INLINE void vertices(const pose *b, const float *half_a, const float *points, int count,
+                     float padding, int *near)
+{
+    lanes low[3], high[3];
+    for (int r = 0; r < 3; r++) {
+        const float *x = b->entry[3 * r], *y = b->entry[3 * r + 1];
+        const float *z = b->entry[3 * r + 2], *t = b->entry[9 + r];
+        lanes least, most;
+        for (int l = 0; l < LANES; l++)
+            least[l] = 1e30f, most[l] = -1e30f;
+        for (int i = 0; i < count; i++) {
+            float px = points[3 * i], py = points[3 * i + 1], pz = points[3 * i + 2];
+            for (int l = 0; l < LANES; l++) {
+                float at = x[l] * px + y[l] * py + z[l] * pz;
+                least[l] = at < least[l] ? at : least[l];
+                most[l] = at > most[l] ? at : most[l];
+            }
+        }
+        for (int l = 0; l < LANES; l++) {
+            low[r][l] = least[l] + t[l];
+            high[r][l] = most[l] + t[l];
+        }
+    }
+    separate(low, high, half_a, padding, near);
+}
+
+static INLINE int any_of(const int *near)
+{
+    int any = 0;
+    for (int l = 0; l < LANES; l++)
+        any |= near[l];
+    return any;
+}
+
+static INLINE void pair_near(const scene *s, const pose *poses, int a, int b, float padding, int *near)
+{
+    if (!spheres_near(&poses[a], &poses[b], s->radius[a] + s->radius[b] + padding, near))
+        return;
+    const float *half_a = s->half + 3 * a, *half_b = s->half + 3 * b;
+    pose b_in_a, a_in_b;
+    relative(&poses[a], &poses[b], &b_in_a);
+    boxes(&b_in_a, half_a, half_b, padding, near);
+    if (!any_of(near))
+        return;
+    relative(&poses[b], &poses[a], &a_in_b);
+    boxes(&a_in_b, half_b, half_a, padding, near);
+    if (!any_of(near))
+        return;
+    const int *start = s->start;
+    vertices(&b_in_a, half_a, s->vertices + 3 * start[b], start[b + 1] - start[b], padding, near);
+    if (!any_of(near))
+        return;
+    vertices(&a_in_b, half_b, s->vertices + 3 * start[a], start[a + 1] - start[a], padding, near);
+}
+
+/* Values, sines and one minus cosines (count, joints) to free (count): 1 where it is sure that all
+ * pairs of bodies are farther apart than the padding. */
+WIDEST void certify(const scene *s, int pairs, const int *pair, float padding, int count,
+             const float *value, const float *sine, const float *versine, unsigned char *free)
+{
+    pose joints[s->joints], poses[s->bodies];
+    for (int first = 0; first < count; first += LANES) {
+        for (int j = 0; j < s->joints; j++) {
+            lanes v, sn, vs;
+            for (int l = 0; l < LANES; l++) {
+                int row = first + l < count ? first + l : count - 1;
+                v[l] = value[row * s->joints + j];
+                sn[l] = sine[row * s->joints + j];
+                vs[l] = versine[row * s->joints + j];
+            }
+            joint_pose(s, j, s->parent[j] < 0 ? 0 : &joints[s->parent[j]], v, sn, vs, &joints[j]);
+        }
+        for (int i = 0; i < s->bodies; i++)
+            body_pose(s->frame + 12 * i, s->joint[i] < 0 ? 0 : &joints[s->joint[i]], &poses[i]);
+        int unsure[LANES] = {0}, near[LANES];
+        for (int p = 0; p < pairs; p++) {
+            pair_near(s, poses, pair[2 * p], pair[2 * p + 1], padding, near);
+            for (int l = 0; l < LANES; l++)
+                unsure[l] |= near[l];
+        }
+        for (int l = 0; l < LANES && first + l < count; l++)
+            free[first + l] = !unsure[l];
+    }
+}

@@ -1,0 +1,171 @@
+"""Configurations that are surely free of collisions, found many at once by compiled code.
+
+The test is sufficient, not necessary: oriented boxes around bodies, and their vertices along the
+axes of the other's box. What it leaves open is for an exact check to decide, so a verdict is the
+same with it and without.
+"""
+
+import ctypes
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from guided_lgp.bounds.results import Array
+from guided_lgp.compiled import load_compiled
+from guided_lgp.robots.measures.hulls import shape_vertices
+
+_ROUNDING = 1e-5
+"""What single precision may be off by (m), added to the padding."""
+
+
+class _Scene(ctypes.Structure):
+    """``scene`` of certificate.c."""
+
+    _fields_ = (
+        ("joints", ctypes.c_int),
+        *((name, ctypes.c_void_p) for name in ("parent", "placement", "sine", "versine", "slide")),
+        ("bodies", ctypes.c_int),
+        *((name, ctypes.c_void_p) for name in ("joint", "frame", "half")),
+        *((name, ctypes.c_void_p) for name in ("start", "vertices", "radius")),
+    )
+
+
+@dataclass(frozen=True)
+class _Body:
+    """A convex body in an oriented box around it."""
+
+    frame: Array
+    """(4, 4) of the box, in the frame of the shape."""
+    half: Array
+    """(3,) m."""
+    vertices: Array
+    """(n, 3) in the box's frame."""
+
+
+class Certificate:
+    """Says of configurations in one scene whether they are surely free."""
+
+    def __init__(self, model: Any, template: Array, geometry: Any, moving: Sequence[str]) -> None:
+        """Prepare a scene.
+
+        Args:
+            model: of the robot, by pinocchio.
+            template: (nq,) of the model; the joints that do not move stay there.
+            geometry: all bodies, by pinocchio; each hangs on a joint.
+            moving: the joints of a configuration.
+        """
+        library = _library()
+        self._certify = None if library is None else library.certify
+        numbers = [model.getJointId(name) for name in moving]
+        self._columns = np.argsort(numbers, kind="stable")  # from the root to the tips
+        joints, self._carriers = _moving_joints(model, template, sorted(numbers))
+        bodies = [_boxed(shape_vertices(body.geometry)) for body in geometry.geometryObjects]
+        self._boxes = [body.frame for body in bodies]
+        self._joint = np.empty(len(bodies), dtype=np.intc)
+        self._frame = np.empty((len(bodies), 12), dtype=np.float32)
+        radii = [np.linalg.norm(body.vertices, axis=1).max() for body in bodies]
+        self._arrays = [
+            *joints,
+            np.array([body.half for body in bodies], dtype=np.float32),
+            np.cumsum([0, *(len(body.vertices) for body in bodies)]).astype(np.intc),
+            np.concatenate([body.vertices for body in bodies]).astype(np.float32),
+            np.array(radii, dtype=np.float32),
+        ]
+        pointers = [array.ctypes.data for array in self._arrays]
+        own = [self._joint.ctypes.data, self._frame.ctypes.data]
+        self._scene = _Scene(len(moving), *pointers[:5], len(bodies), *own, *pointers[5:])
+        for number, body in enumerate(geometry.geometryObjects):
+            self.move(number, body.parentJoint, body.placement.homogeneous)
+
+    def move(self, body: int, joint: int, placement: Array) -> None:
+        """Put a body somewhere: pose (4, 4) in the frame of a joint of the model."""
+        carrier, offset = self._carriers[joint]
+        self._joint[body] = carrier
+        self._frame[body] = _flat(offset @ placement @ self._boxes[body])
+
+    def free(self, values: Array, pairs: NDArray[np.intc], padding: float) -> NDArray[np.bool_]:
+        """Which configurations (m,) are surely free; none of them without a compiler.
+
+        Args:
+            values: (m, joints) of the moving joints (rad or m).
+            pairs: (p, 2) numbers of bodies that are to be apart, contiguous.
+            padding: the distance (m) that they keep at least.
+        """
+        free = np.zeros(len(values), dtype=np.bool_)
+        if self._certify is not None:
+            plain = np.ascontiguousarray(values[:, self._columns], dtype=np.float32)
+            arrays = plain, np.sin(plain), 1 - np.cos(plain), free
+            self._certify(
+                ctypes.byref(self._scene),
+                len(pairs),
+                ctypes.c_void_p(pairs.ctypes.data),
+                ctypes.c_float(padding + _ROUNDING),
+                len(values),
+                *(ctypes.c_void_p(array.ctypes.data) for array in arrays),
+            )
+        return free
+
+
+@cache
+def _library() -> ctypes.CDLL | None:
+    source = Path(__file__).with_name("certificate.c").read_text(encoding="utf-8")
+    return load_compiled("certificate", source)
+
+
+def _moving_joints(
+    model: Any, template: Array, moving: list[int]
+) -> tuple[list[NDArray[Any]], list[tuple[int, Array]]]:
+    """The moving joints alone, as certificate.c wants them.
+
+    Returns:
+        parent, placement, sine, versine and slide; and for every joint of the model the moving one
+        that it hangs on (-1: none), with its pose (4, 4) there.
+    """
+    data = model.createData()
+    pin.forwardKinematics(model, data, template)
+    carriers: list[tuple[int, Array]] = [(-1, np.eye(4))]
+    parents: list[int] = []
+    rows: list[tuple[Array, ...]] = []
+    for joint in range(1, model.njoints):
+        carrier, offset = carriers[model.parents[joint]]
+        if joint not in moving:
+            carriers.append((carrier, offset @ data.liMi[joint].homogeneous))
+            continue
+        carriers.append((len(parents), np.eye(4)))
+        parents.append(carrier)
+        placement = offset @ model.jointPlacements[joint].homogeneous
+        slide, axis = np.split(np.ravel(data.joints[joint].S), 2)
+        cross = np.cross(axis, np.eye(3)).T
+        turn = placement[:3, :3]
+        rows.append((_flat(placement), turn @ cross, turn @ cross @ cross, turn @ slide))
+    arrays = (np.array(column, dtype=np.float32) for column in zip(*rows, strict=True))
+    return [np.array(parents, dtype=np.intc), *arrays], carriers
+
+
+def _flat(placement: Array) -> Array:
+    """Rotation by rows, then position (12,), of a pose (4, 4)."""
+    return np.concatenate([placement[:3, :3].ravel(), placement[:3, 3]])
+
+
+def _boxed(vertices: Array) -> _Body:
+    """The smaller one of two boxes: along the frame's axes, and along the principal ones."""
+    _, _, principal = np.linalg.svd(vertices - vertices.mean(axis=0), full_matrices=False)
+    return min(
+        (_in_box(vertices, axes) for axes in (np.eye(3), principal)),
+        key=lambda body: float(np.prod(body.half)),
+    )
+
+
+def _in_box(vertices: Array, axes: Array) -> _Body:
+    """Vertices (n, 3) in the box along axes (3, 3), one per row; a mirror image does no harm."""
+    along = vertices @ axes.T
+    low, high = along.min(axis=0), along.max(axis=0)
+    frame = np.eye(4)
+    frame[:3, :3], frame[:3, 3] = axes.T, axes.T @ (low + high) / 2
+    return _Body(frame, (high - low) / 2, along - (low + high) / 2)
