@@ -15,6 +15,7 @@ from guided_lgp.logic import (
     Symbols,
     format_objective,
     one_goal_objectives,
+    parse_objective,
     parse_skeleton,
     progress,
     two_goal_objectives,
@@ -26,6 +27,11 @@ _BETWEEN = ("clear", "apart", "beside", "stand", "balanced")
 """Constraints of which the kinds of the two bodies matter."""
 
 
+def read_objective(text: str) -> Objective:
+    """An objective as :func:`guided_lgp.logic.format_objective` writes it."""
+    return parse_objective(re.findall(r"\([^()]*\)", text))
+
+
 def objective_kind(objective: str, boxes: Collection[str]) -> str:
     """The types of an objective's goals, such as ``held + on box``.
 
@@ -34,8 +40,7 @@ def objective_kind(objective: str, boxes: Collection[str]) -> str:
         boxes: names of the boxes; a goal on another table counts as ``on table``.
     """
     kinds = []
-    for text in re.findall(r"\([^()]*\)", objective):
-        goal = Goal.parse(text)
+    for goal in read_objective(objective):
         others = ("box" if name in boxes else "table" for name in goal.symbols[1:])
         kinds.append(" ".join((goal.kind, *others)))
     return " + ".join(sorted(kinds))

@@ -152,7 +152,8 @@ def _replays(inputs: Inputs, bounds: BoundsParams, reports: Path) -> list[tuple[
             trajectory = SceneBounds(scene, bounds).path(actions).trajectory
             if trajectory is not None:
                 address = f"replays/{setup}.html"
-                replay_html(trajectory, scene, reports / address, actions)
+                objective = analysis.read_objective(str(plan.objective))
+                replay_html(trajectory, scene, reports / address, actions, objective)
                 planner = TABLE_3[str(plan.planner)].label
                 text = f"{plan.objective}: {len(actions)} actions, {planner}"
                 written.append((address, f"Problem {plan.problem}, {text}"))

@@ -9,7 +9,7 @@ from guided_lgp.documents import write_text
 from guided_lgp.logic import Objective, Skeleton, format_objective
 from guided_lgp.scene.model import Scene
 from guided_lgp.view.motion import Step, frames, play, steps
-from guided_lgp.view.viewer import Viewer
+from guided_lgp.view.viewer import FIELD_OF_VIEW, Viewer
 
 _STILL_S = 1.0
 """How long the first and the last frame stay (s)."""
@@ -56,4 +56,4 @@ def _panel(shown: list[Step], objective: Objective) -> str:
     )
     template = Path(__file__).with_name("panel.html").read_text(encoding="utf-8")
     goals = html.escape(format_objective(objective))
-    return Template(template).substitute(goals=goals, steps=items)
+    return Template(template).substitute(goals=goals, steps=items, fov=FIELD_OF_VIEW)

@@ -23,6 +23,9 @@ _FIRST_HUE, _HUE_STEP = 0.51, (5**0.5 - 1) / 2
 """Hues of the boxes that no colour is named after, in turns from red: teal, then golden sections
 of the circle, which keep any number of hues apart."""
 
+FIELD_OF_VIEW = 0.75
+"""Of the camera, from bottom to top (rad): the whole robot."""
+
 
 class Viewer:
     """A viser server on the loopback interface that shows one scene.
@@ -83,7 +86,7 @@ class Viewer:
         camera = self.server.initial_camera
         camera.position = (2.6, -0.7, 1.8)
         camera.look_at = (0.2, 0.0, 0.72)
-        camera.fov = 0.75
+        camera.fov = FIELD_OF_VIEW
 
     def _add_robot(self) -> None:
         scene = self.server.scene
