@@ -8,7 +8,7 @@ INSTALLED := $(VENV)/.installed
 export PATH := $(BIN):$(PATH)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: setup ship quick repro study test lint bench mlflow verify-determinism verify-interruption verify-load
+.PHONY: setup ship quick repro study test lint bench mlflow verify-determinism verify-interruption verify-load sources
 
 setup: $(INSTALLED)
 
@@ -73,6 +73,10 @@ verify-interruption: setup
 # 500 plans in one process, 200 experiments in one database.
 verify-load: setup
 	python tests/load.py
+
+# The sources that the stages of dvc.yaml and studies/dvc.yaml depend on, as they load and read them.
+sources: setup
+	python tests/stage_sources.py
 
 mlflow: setup
 	guided-lgp mlflow ui

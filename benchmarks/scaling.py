@@ -20,7 +20,7 @@ from guided_lgp.documents import write_json, written_whole
 from guided_lgp.experiments import enumerate_sequences
 from guided_lgp.logic import Objective, two_goal_objectives
 from guided_lgp.params import load_params
-from guided_lgp.paths import DATASET, METRICS, PARAMS
+from guided_lgp.paths import DATASET, METRICS, PARAMS, PIPELINE
 from guided_lgp.policy.paper.samples import build_dataset
 from guided_lgp.report.cells import number
 from guided_lgp.report.table import Table
@@ -51,6 +51,8 @@ def configurations() -> list[dict[str, float]]:
     for count in CONFIGURATIONS:
         with tempfile.TemporaryDirectory() as folder:
             root = Path(folder)
+            for needed in (PIPELINE, Path("src")):
+                (root / needed).symlink_to(ROOT / needed)
             training = generate("a", count, SEED, "training")
             training.save(root / "data" / "scenes" / "training.json")
             generate("a", 1, SEED + 1, "test").save(root / "data" / "scenes" / "test.json")

@@ -21,6 +21,7 @@ DESCRIPTIONS = SHIPPED / "robots"
 """URDF, SRDF and meshes of robots, a folder each."""
 
 # What the stages read and write, relative to the folder of dvc.yaml.
+PIPELINE = Path("dvc.yaml")
 PARAMS = Path("params.yaml")
 SCENES = Path("data/scenes")
 SEQUENCES = Path("data/sequences")

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
+import yaml
 
 from guided_lgp.bounds.results import CoarseResult, Failure
 from guided_lgp.errors import InputError
@@ -57,7 +58,15 @@ def scripted(monkeypatch: pytest.MonkeyPatch) -> type[OneHand]:
     return OneHand
 
 
+SOURCE = "src/bound.py"
+
+
 def make_root(folder: Path) -> Path:
+    stages = {"enumerate_sequences": {"deps": [SOURCE, "data/scenes/training.json"]}}
+    (folder / "src").mkdir(parents=True)
+    (folder / SOURCE).write_text("eq. (3)")
+    (folder / "src" / "other.py").touch()
+    (folder / "dvc.yaml").write_text(yaml.safe_dump({"stages": stages}))
     for split, count in (("training", 2), ("test", 2)):
         generate("a", count, 9, split).save(folder / "data" / "scenes" / f"{split}.json")
     return folder
@@ -145,6 +154,19 @@ def test_a_damaged_shard_is_computed_again(
     assert len(scripted.opened) == 5
     for name in OUTPUTS:
         assert (root / "data" / "sequences" / name).read_bytes() == whole[name]
+
+
+def test_shards_of_other_sources_are_not_used(
+    tmp_path: Path, params: Params, scripted: type[OneHand]
+) -> None:
+    root = make_root(tmp_path)
+    enumerate_sequences.run(params, root)
+    (root / "src" / "other.py").write_text("of another case")
+    enumerate_sequences.run(params, root)
+    assert len(scripted.opened) == 4
+    (root / SOURCE).write_text("eq. (4)")
+    enumerate_sequences.run(params, root)
+    assert len(scripted.opened) == 8
 
 
 def test_what_the_tables_hold(tmp_path: Path, params: Params, scripted: type[OneHand]) -> None:

@@ -2,9 +2,9 @@
 
 Each configuration is a shard that its worker writes as soon as it is done, outside the outputs
 that DVC deletes before it starts the stage: after a kill, only the shards in progress are redone.
-The name of a shard is a digest of all that it depends on, the source code included. The shards stay
-until another run does not need them: DVC can be killed after the stage has ended. A shard whose
-files are not those that were written is computed again.
+The name of a shard is a digest of all that it depends on, with the sources that dvc.yaml lists for
+the stage. The shards stay until another run does not need them: DVC can be killed after the stage
+has ended. A shard whose files are not those that were written is computed again.
 """
 
 import json
@@ -12,18 +12,16 @@ import logging
 import os
 from collections.abc import Set
 from dataclasses import dataclass
-from functools import cache
 from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
 
-import guided_lgp
 from guided_lgp import parallel
 from guided_lgp.bounds.results import CoarseResult
 from guided_lgp.bounds.scene_bounds import SceneBounds
-from guided_lgp.documents import made_whole, remove, write_text
+from guided_lgp.documents import made_whole, read_yaml, remove, write_text
 from guided_lgp.errors import InputError
 from guided_lgp.logic import (
     format_objective,
@@ -32,7 +30,7 @@ from guided_lgp.logic import (
     two_goal_objectives,
 )
 from guided_lgp.params import BoundsParams, EnumerateSequences, Params
-from guided_lgp.paths import SCENES, SEQUENCES
+from guided_lgp.paths import PIPELINE, SCENES, SEQUENCES
 from guided_lgp.scene import Scene, load_scenes
 from guided_lgp.search.enumerate import Enumeration, enumerate_sequences
 from guided_lgp.search.observation import observe, start
@@ -54,6 +52,8 @@ class Task:
     scene: Scene
     bounds: BoundsParams
     limits: EnumerateSequences
+    sources: str
+    """Digest of the code that a verdict depends on."""
     folder: Path
 
     @property
@@ -63,7 +63,7 @@ class Task:
             self.scene.model_dump(mode="json"),
             self.bounds.model_dump(),
             self.limits.model_dump(),
-            _sources(),
+            self.sources,
         ]
         return self.folder / sha256(json.dumps(content).encode()).hexdigest()[:24]
 
@@ -72,10 +72,8 @@ def run(params: Params, root: Path) -> None:
     """Write ``data/sequences/{training,test}.parquet`` and ``{training,test}_shortest.parquet``."""
     folder = root / SEQUENCES.parent / ".shards"
     splits = {name: load_scenes(root / SCENES / f"{name}.json").scenes for name in SPLITS}
-    tasks = {
-        name: [Task(scene, params.bounds, params.enumerate_sequences, folder) for scene in scenes]
-        for name, scenes in splits.items()
-    }
+    given = params.bounds, params.enumerate_sequences, source_digest(root), folder
+    tasks = {name: [Task(scene, *given) for scene in scenes] for name, scenes in splits.items()}
     whole = [task for split in tasks.values() for task in split]
     _remove_others(folder, {task.shard for task in whole})
     parallel.run(write_shard, whole, params.parallel, "enumerate")
@@ -177,13 +175,21 @@ def _states(scene: Scene, verdict: CoarseResult) -> list[float]:
     return flat
 
 
-@cache
-def _sources() -> str:
-    """Digest of the code that a verdict depends on."""
-    package = Path(guided_lgp.__file__).parent
+def source_digest(root: Path) -> str:
+    """Digest of the sources that dvc.yaml lists for this stage.
+
+    Raises:
+        InputError: dvc.yaml is missing or damaged.
+    """
     digest = sha256()
-    for part in ("logic", "robots", "scene", "bounds", "search", "experiments"):
-        for path in sorted((package / part).rglob("*")):
-            if path.suffix in {".py", ".yaml", ".c", ".h"}:
-                digest.update(path.read_bytes())
+    for source in read_yaml(root / PIPELINE)["stages"][STAGE]["deps"]:
+        if Path(source).is_relative_to("src"):
+            for file in _files(root / source):
+                digest.update(file.read_bytes())
     return digest.hexdigest()
+
+
+def _files(path: Path) -> list[Path]:
+    """The file itself, or the files of a folder."""
+    found = path.rglob("*") if path.is_dir() else (path,)
+    return sorted(file for file in found if file.is_file() and "__pycache__" not in file.parts)
