@@ -5,7 +5,7 @@ import pytest
 
 from guided_lgp.bounds.checks import Top
 from guided_lgp.bounds.coarse.solver import default_solver
-from guided_lgp.bounds.program.grasp import tool_targets
+from guided_lgp.bounds.program.grasp import PALM_GAP, tool_targets
 from guided_lgp.bounds.program.inverse import reaches
 from guided_lgp.bounds.program.kernels import SCALE
 from guided_lgp.bounds.program.kinematics import kinematics_of
@@ -39,7 +39,7 @@ def both_verdicts(verdicts: list[bool]) -> None:
 
 
 def held(gripper: str = "pr2L") -> HeldBox:
-    return HeldBox(gripper, "red", 0, 1, 0.0, HALF_LENGTH, HALF_HEIGHT)
+    return HeldBox(gripper, "red", 0, 1, 2, 0.0, HALF_LENGTH, HALF_HEIGHT)
 
 
 @pytest.mark.parametrize("gripper", ROBOT.grippers)
@@ -50,13 +50,14 @@ def test_hold(gripper: str) -> None:
     for _ in range(80):
         place = np.array([0.55, 0.2 * arm.side, rng.uniform(-1.5, 1.5), rng.uniform(0.5, 0.8)])
         pitch, offset = rng.uniform(0.4, 2.7), rng.uniform(-0.04, 0.04)
+        depth = rng.uniform(PALM_GAP, 0.04)
         joints, missing = reach(
-            held(gripper), offset, place[None], np.array([pitch]), np.zeros((1, 2))
+            held(gripper), (offset, depth), place[None], np.array([pitch]), np.zeros((1, 2))
         )
         q = joints[0, 0, 0, np.argmin(missing[0, 0, 0])].copy()
         q[rng.integers(7)] += rng.choice([0.0, 0.2])
         grasp = (HALF_LENGTH, HALF_HEIGHT, 0.0, 0.0)
-        x = np.array([*q, pitch, offset, *place])
+        x = np.array([*q, pitch, offset, depth, *place])
         rows = residual("hold_0", x, np.array([arm.side, *FIXED, 0.0, 0.0, *grasp]))
         whole = ROBOT.home.copy()
         whole[arm.arm.slice] = arm.arm.signs * q
@@ -73,22 +74,19 @@ def test_hold(gripper: str) -> None:
 
 def test_pads() -> None:
     rng, verdicts = np.random.default_rng(1), []
-    inner = (HALF_LENGTH - hold.PAD_MARGIN, HALF_HEIGHT - hold.PAD_MARGIN)
     palm_front = ROBOT.arms["pr2L"].palm_front
     for _ in range(200):
         pitch, offset = rng.uniform(0.0, np.pi), rng.uniform(-0.09, 0.09)
-        rows = residual(
-            "pads_0", np.array([pitch, offset]), np.array([HALF_LENGTH, HALF_HEIGHT, *inner])
-        )
+        depth = rng.uniform(PALM_GAP, 0.04)
+        sides = np.array([HALF_LENGTH, HALF_HEIGHT])
+        rows = residual("pads_0", np.array([pitch, offset, depth]), sides)
+        hand, pitches = (offset, depth), np.array([pitch])
         rotation, position = tool_targets(
-            held(), offset, np.zeros((1, 4)), np.array([pitch]), np.zeros((1, 2)), palm_front
+            held(), hand, np.zeros((1, 4)), pitches, np.zeros((1, 2)), palm_front
         )
         tool = [*position[0, 0, 0], *quaternion(rotation[0, 0, 0])]
         excess = pads.check(SIZE, pose((0.0, 0.0, 0.0)).tolist(), tool)
-        if rows.min() >= 0:
-            assert excess < 0
-        slack = hold.PAD_MARGIN - pads.GRASP_INSET
-        assert (excess < 0) == (rows[:4].min() > -slack)  # the first rows are the fingertips'
+        assert excess == pytest.approx(-rows.min() - pads.TOLERANCE, abs=1e-5)
         verdicts.append(excess < 0)
     both_verdicts(verdicts)
 

@@ -14,11 +14,9 @@ from guided_lgp.bounds.coarse.formulation import straight_lines
 from guided_lgp.bounds.coarse.reach import Grasp, Limb
 from guided_lgp.bounds.program.context import Line
 from guided_lgp.bounds.program.geometry import SceneGeometry
-from guided_lgp.bounds.program.grasp import PALM_GAP
+from guided_lgp.bounds.program.grasp import INSET, PALM_GAP
 from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.bounds.results import Array
-from guided_lgp.bounds.terms.hold import PAD_MARGIN
-from guided_lgp.bounds.terms.pads import PAD_CENTRE
 from guided_lgp.logic import Skeleton, successor
 from guided_lgp.logic.domain import GroundInstruction
 
@@ -109,19 +107,17 @@ class Facts:
         """All grasps of the box there, with every value of the arm's first joint."""
         turn, half_length, _ = self._geometry.grasp_side(hold.box)
         half_height = self._geometry.bodies[hold.box].half[2]
-        slide = max(half_length, half_height) - PAD_MARGIN
+        along, up = half_length - INSET, half_height - INSET
         low, high, height = self._region(hold)
         arm, limb = self._arms[hold.gripper], self._limbs[hold.gripper]
         assert limb is not None
         return Grasp(
-            low=np.array([*low[:2], low[2] + turn, 0.0, -slide, limb.limits[0, 0]]),
-            high=np.array([*high[:2], high[2] + turn, np.pi, slide, limb.limits[0, 1]]),
+            low=np.array([*low[:2], low[2] + turn, 0.0, -along, -up, limb.limits[0, 0]]),
+            high=np.array([*high[:2], high[2] + turn, np.pi, along, up, limb.limits[0, 1]]),
             height=height,
             half_length=half_length,
             half_height=half_height,
-            depth=arm.chain.palm_front + PALM_GAP,
-            inner=(half_length - PAD_MARGIN, half_height - PAD_MARGIN),
-            pad=-PAD_CENTRE,
+            palm=arm.chain.palm_front + PALM_GAP,
             ends=((0.0, 0.0), *((line.back, line.up) for line in hold.lines)),
         )
 

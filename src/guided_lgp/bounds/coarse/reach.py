@@ -25,7 +25,7 @@ _SLACK_ANGLE = 0.02
 """Tolerance of joint limits (rad)."""
 _SMALLEST = 0.004
 """Cells whose wrist moves by less (m) are not divided: the solver decides."""
-_EFFORT = 50_000
+_EFFORT = 20_000
 """Cells looked at before the proof is given up, for each variable that is free."""
 _TURNED_OVER = [0, 2, 4, 6]
 """The joints that turn about x or z."""
@@ -39,19 +39,16 @@ class Grasp:
     """
 
     low: Array
-    """(6,) x, y and heading of the box's length, pitch, offset, shoulder pan (m, rad) ..."""
+    """(7,) x, y and heading of the box's length, pitch, where the tool's origin is from the box's
+    centre, along its length and up, and shoulder pan (m, rad) ..."""
     high: Array
     """... and the other end; equal where a value is given."""
     height: float
     """z of the box's centre (m)."""
     half_length: float
     half_height: float
-    depth: float
-    """Palm beyond the tool frame's origin, and its distance from the box (m)."""
-    inner: tuple[float, float]
-    """How far along and up (m) from the box's centre the fingertips may be ..."""
-    pad: float
-    """... and, so far behind them (m), their pads."""
+    palm: float
+    """Palm beyond the tool frame's origin, and its least distance from the box (m)."""
     ends: tuple[tuple[float, float], ...]
     """Ways straight back along the hand and straight up (m) to which the arm must get, too."""
 
@@ -107,60 +104,51 @@ class Limb:
         effort, allowed = 0, _EFFORT * np.count_nonzero(half)
         while len(cells):
             effort += len(cells)
+            if effort > allowed:
+                return False
             cells = cells[self._open(grasp, cells, half)]
-            if self._open(grasp, cells, np.zeros(6)).any():
+            if self._open(grasp, _typical(grasp, cells), np.zeros(7)).any():
                 return False
             moved = half * self._levers(grasp)
-            if moved.sum() < _SMALLEST or effort > allowed:
+            if moved.sum() < _SMALLEST:
                 return len(cells) == 0
             for axis in np.flatnonzero(moved >= 0.6 * moved.max()):
-                half = np.where(np.arange(6) == axis, half / 2, half)
-                step = np.where(np.arange(6) == axis, half, 0.0)
+                half = np.where(np.arange(7) == axis, half / 2, half)
+                step = np.where(np.arange(7) == axis, half, 0.0)
                 cells = np.concatenate([cells - step, cells + step])
         return True
 
     def _levers(self, grasp: Grasp) -> Array:
-        """(6,) how far (m) the wrist moves at most per unit of each variable."""
-        longest = grasp.half_length + grasp.half_height + abs(grasp.depth) + self.hand
-        longest += max(back for back, _ in grasp.ends) + grasp.high[4]
-        return np.array([1.0, 1.0, longest, longest, 1.0, self.upper + self.fore])
+        """(7,) how far (m) the wrist moves at most per unit of each variable."""
+        behind = self.hand + max(back for back, _ in grasp.ends)
+        out = grasp.high[4] + behind
+        return np.array([1.0, 1.0, out, behind, 1.0, 1.0, self.upper + self.fore])
 
     def _open(self, grasp: Grasp, cells: Array, half: Array) -> Flags:
         """Which cells may hold a grasp for which all ends can be reached."""
-        x, y, heading, pitch, offset, pan = cells.T
+        x, y, heading, pitch, along, up, pan = cells.T
         cp, sp = np.cos(pitch), np.sin(pitch)
-        depth = grasp.half_length * np.abs(cp) + grasp.half_height * sp + grasp.depth
-        slope = np.hypot(grasp.half_length, grasp.half_height)  # of the depth in the pitch
-        held = np.ones(len(cells), bool)
-
-        def swing(far: Array) -> Array:
-            """How far a point moves that is so far along the hand, by pitch and offset."""
-            lever = np.abs(far) + half[3] * slope + np.abs(offset) + half[4]
-            return np.asarray(half[3] * (slope + lever) + half[4] + _SLACK)
-
-        for back in (0.0, grasp.pad):
-            along = (depth + back) * cp + offset * sp
-            up = (depth + back) * sp - offset * cp
-            moved = swing(depth + back)
-            held &= (np.abs(along) <= grasp.inner[0] + moved) & (
-                np.abs(up) <= grasp.inner[1] + moved
-            )
+        shift = np.hypot(half[4], half[5]) + _SLACK
+        tip = np.hypot(along, up) + shift
+        reach = grasp.half_length * np.abs(cp) + grasp.half_height * sp
+        slope = np.hypot(grasp.half_length, grasp.half_height)  # of the reach in the pitch
+        held = up * sp - along * cp + shift + half[3] * (tip + slope) >= reach + grasp.palm
         for back, raised in grasp.ends:
-            out = depth + back + self.hand
-            flat = out * cp + offset * sp
+            behind = self.hand + back
+            flat = along - behind * cp
             wrist = np.stack(
                 [
-                    x - flat * np.cos(heading),
-                    y - flat * np.sin(heading),
-                    grasp.height + raised + out * sp - offset * cp,
+                    x + flat * np.cos(heading),
+                    y + flat * np.sin(heading),
+                    grasp.height + raised + up + behind * sp,
                 ]
             )
-            moved = swing(out)
-            radius = half[0] + half[1] + moved + half[2] * (np.abs(flat) + moved)
+            moved = half[3] * behind + shift
+            radius = np.hypot(half[0], half[1]) + moved + half[2] * (np.abs(flat) + moved)
             relative = heading - pan
             tool = np.stack([cp * np.cos(relative), cp * np.sin(relative), -sp])
-            held &= self.reaches(wrist, radius, tool, half[[2, 3, 5]].sum(), pan, half[5])
-        return held
+            held &= self.reaches(wrist, radius, tool, half[[2, 3, 6]].sum(), pan, half[6])
+        return np.asarray(held)
 
     def reaches(
         self, wrist: Array, radius: Array, tool: Array, twist: float, pan: Array, turn: float
@@ -276,6 +264,18 @@ class _Wrists:
         object.__setattr__(self, "distance", np.hypot(self.planar, self.y))
 
 
+def _typical(grasp: Grasp, cells: Array) -> Array:
+    """Grasps (2 n, 7) like those given, with the palm at the box and with the fingertips only."""
+    cp, sp = np.cos(cells[:, 3]), np.sin(cells[:, 3])
+    touching = grasp.half_length * np.abs(cp) + grasp.half_height * sp + grasp.palm
+    within = grasp.high[4:6] / np.maximum(np.abs([cp, sp]).T, 1e-9)
+    moved = []
+    for reach in (touching, within.min(axis=1)):
+        tip = np.clip(np.stack([-reach * cp, reach * sp], axis=1), grasp.low[4:6], grasp.high[4:6])
+        moved.append(np.column_stack([cells[:, :4], tip, cells[:, 6]]))
+    return np.concatenate(moved)
+
+
 def _rolled(wrists: _Wrists, out: Array, sines: tuple[float, float]) -> Flags:
     """Whether a roll of the upper arm within its limits brings the wrist so far to the side."""
     least, most = sines
@@ -283,8 +283,8 @@ def _rolled(wrists: _Wrists, out: Array, sines: tuple[float, float]) -> Flags:
     return np.asarray((high >= (least * out).min(axis=0)) & (low <= (most * out).max(axis=0)))
 
 
-_FIRST_CELLS = np.array([1, 1, 4, 6, 1, 6])
-"""Cells of the first division, where a variable is free: x, y, heading, pitch, offset, pan."""
+_FIRST_CELLS = np.array([1, 1, 4, 6, 1, 1, 6])
+"""Cells of the first division, where a variable is free, in the order of ``Grasp.low``."""
 
 
 def _sines(limits: Array, centre: float) -> tuple[float, float]:

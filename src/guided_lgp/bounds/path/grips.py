@@ -6,21 +6,20 @@ from itertools import product
 
 import numpy as np
 
+from guided_lgp.bounds.program.grasp import INSET, PALM_GAP
 from guided_lgp.bounds.results import Array
 from guided_lgp.robots import Arm
 from guided_lgp.scene import Box
 from guided_lgp.scene.model import grasp_axis
 
-PALM_GAP = 0.002
-"""Distance (m) of the palm's front from the box, at least."""
 _PITCHES = 8
 """Steps of the approach from one end of the box over the top to the other."""
 _SHIFTS = (0.0, 0.02, -0.02)
 """Offsets (m) of the hand along its third axis, across approach and fingers."""
-_DEPTHS = (0.0, 0.02)
-"""Distances (m) by which the hand may stay back from the deepest grasp."""
-_INSET = 0.008
-"""How far inside the box's side the fingertips' centre is (m), at least."""
+_LEAST = 1e-9
+"""Cosine that stands for a right angle."""
+_DEPTHS = 3
+"""Distances of the palm from the box: from the least one to where only the fingertips hold it."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +50,7 @@ def grips_of(box: Box, arm: Arm) -> tuple[Grips, Grips]:
 
     Both are empty for a box that is too wide for the hand.
     """
-    return _grips(box.size, arm.palm_front, arm.fingers.widest)
+    return _grips(box.size, arm.palm_front, arm.fingers.grasp_width)
 
 
 @cache
@@ -66,15 +65,24 @@ def _grips(
     pitches = np.pi * np.arange(_PITCHES + 1) / _PITCHES
     if 2 * half[across] > widest:
         pitches = pitches[:0]
-    for pitch, shift, back, flip in product(pitches, _SHIFTS, _DEPTHS, (1.0, -1.0)):
+    for pitch, shift in product(pitches, _SHIFTS):
         approach = np.cos(pitch) * along - np.sin(pitch) * np.array([0.0, 0.0, 1.0])
-        depth = np.abs(approach) @ half + palm_front + PALM_GAP + back
         third = np.cross(approach, closing)
-        offset = shift * third - depth * approach
-        if np.all(np.abs(offset) <= half - _INSET):
-            grip = np.stack([approach, flip * closing, flip * third], axis=1), offset
-            (others if shift or back else central).append(grip)
+        for number, reach in enumerate(_reaches(half, palm_front, approach, shift * third)):
+            offset = shift * third - reach * approach
+            for flip in (1.0, -1.0):
+                grip = np.stack([approach, flip * closing, flip * third], axis=1), offset
+                (others if shift or number else central).append(grip)
     return _stacked(central), _stacked(others)
+
+
+def _reaches(half: Array, palm_front: float, approach: Array, shift: Array) -> Array:
+    """How far (m) the tool may stay behind the box's centre, deepest first; none that holds it."""
+    palm = np.abs(approach) @ half + palm_front + PALM_GAP
+    ahead, inner = np.copysign(1.0, approach) * shift, half - INSET
+    slope = np.maximum(np.abs(approach), _LEAST)
+    nearest, farthest = max(palm, *((ahead - inner) / slope)), min((ahead + inner) / slope)
+    return np.linspace(nearest, farthest, _DEPTHS if nearest <= farthest else 0)
 
 
 def _stacked(grips: list[tuple[Array, Array]]) -> Grips:

@@ -1,9 +1,11 @@
 """Where the tool is on a box that it holds.
 
-A grasp has a pitch and an offset. The fingers close across the box's width; the approach axis lies
-in the vertical plane along its length, ``pitch`` below the horizontal (pi/2: from above; beyond:
-from the other end). The palm touches the box's nearest corner, ``offset`` moves the tool along its
-own z axis.
+A grasp has a pitch, an offset and a depth. The fingers close across the box's width; the approach
+axis lies in the vertical plane along its length, ``pitch`` below the horizontal (pi/2: from above;
+beyond: from the other end). ``depth`` is the distance of the palm from the box's nearest corner,
+``offset`` moves the tool along its own z axis. One rule says which of them hold the box, for coarse
+bound, path bound and verification: the palm is outside of it, by ``PALM_GAP`` or more, and the
+tool frame's origin, which is between the fingertips, is over its side, by ``INSET`` or more.
 """
 
 from typing import Any
@@ -17,19 +19,23 @@ from guided_lgp.bounds.results import Array
 from guided_lgp.poses import multiply, pose
 
 PALM_GAP = 0.002
-"""Distance of the box's nearest corner from the palm (m)."""
+"""Least distance of the box's nearest corner from the palm (m)."""
+INSET = 0.003
+"""How far inside the box's side the tool frame's origin is at least (m): a box of 25 mm on a table
+is grasped from above only so. Fingertips reach 3 to 19 mm beyond that point and 11 mm to its sides,
+so at least 6 by 14 mm of them are on the box."""
+Hand = tuple[float, float]
+"""Offset of a hand and its depth (m)."""
 
 
-def tool_target(
-    pose: Any, height: Any, pitch: Any, offset: Any, p: Any, palm_front: float
-) -> tuple[Any, Any]:
+def tool_target(pose: Any, height: Any, grip: Any, p: Any, palm_front: float) -> tuple[Any, Any]:
     """Where the tool must be to hold a level box, symbolically.
 
     Args:
         pose: (x, y, yaw) of the box.
         height: z of its centre (m).
-        pitch: of the approach (rad), in [0, pi].
-        offset: along the tool's z axis (m).
+        grip: pitch of the approach (rad), in [0, pi]; offset along the tool's z axis (m); depth,
+            the palm's distance from the box (m).
         p: (half length, half height, turn of the length against the box's x axis, distance back
             along the approach).
         palm_front: x of the palm's front in the tool frame (m).
@@ -38,24 +44,25 @@ def tool_target(
         position (3,) and rotation (3, 3) of the tool.
     """
     half_length, half_height, turn, back = (p[i] for i in range(4))
+    pitch, offset, depth = (grip[i] for i in range(3))
     heading = pose[2] + turn
     ch, sh, cp, sp = ca.cos(heading), ca.sin(heading), ca.cos(pitch), ca.sin(pitch)
     x_axis = ca.vertcat(ch * cp, sh * cp, -sp)
     y_axis = ca.vertcat(-sh, ch, 0)
     z_axis = ca.vertcat(ch * sp, sh * sp, cp)
-    reach = half_length * absolute(cp) + half_height * sp + palm_front + PALM_GAP
+    reach = half_length * absolute(cp) + half_height * sp + palm_front + depth
     centre = ca.vertcat(pose[0], pose[1], height)
     return centre - (reach + back) * x_axis - offset * z_axis, ca.horzcat(x_axis, y_axis, z_axis)
 
 
 def tool_targets(
-    held: HeldBox, offset: float, poses: Array, pitches: Array, ends: Array, palm_front: float
+    held: HeldBox, hand: Hand, poses: Array, pitches: Array, ends: Array, palm_front: float
 ) -> tuple[Array, Array]:
     """The same in numbers, over a grid.
 
     Args:
         held: the grasp's lengths and turn.
-        offset: along the tool's z axis (m).
+        hand: offset along the tool's z axis and depth (m).
         poses: (N, 4) x, y, yaw and z of the box.
         pitches: (M,) of the approach (rad).
         ends: (E, 2) how far the tool is back along its approach and up (m).
@@ -70,8 +77,9 @@ def tool_targets(
     x_axis = np.stack([ch * cp, sh * cp, zero - sp], axis=-1)
     y_axis = np.stack([zero - sh, zero + ch, zero], axis=-1)
     z_axis = np.stack([ch * sp, sh * sp, zero + cp], axis=-1)
-    depth = held.half_length * np.abs(cp) + held.half_height * sp + palm_front + PALM_GAP
-    contact = poses[:, None, [0, 1, 3]] - depth[:, None] * x_axis - offset * z_axis
+    offset, depth = hand
+    reach = held.half_length * np.abs(cp) + held.half_height * sp + palm_front + depth
+    contact = poses[:, None, [0, 1, 3]] - reach[:, None] * x_axis - offset * z_axis
     position = contact[:, :, None] - ends[:, :1] * x_axis[:, :, None]
     position[..., 2] += ends[:, 1]
     return np.stack([x_axis, y_axis, z_axis], axis=-1)[:, :, None], position
@@ -79,8 +87,8 @@ def tool_targets(
 
 def in_tool(held: HeldBox, values: Array, palm_front: float) -> Array:
     """Pose (7,) of a held box in the tool frame of its gripper."""
-    pitch, offset = values[held.pitch], values[held.offset]
+    pitch, offset, depth = values[list(held.grip)]
     reach = held.half_length * abs(np.cos(pitch)) + held.half_height * np.sin(pitch)
     level = np.array([0.0, -np.sin(pitch / 2), 0.0, np.cos(pitch / 2)])
     turned = multiply(level, pose((0, 0, 0), -held.turn)[3:])
-    return np.array([reach + palm_front + PALM_GAP, 0.0, offset, *turned])
+    return np.array([reach + palm_front + depth, 0.0, offset, *turned])

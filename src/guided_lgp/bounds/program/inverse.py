@@ -12,14 +12,14 @@ import casadi as ca
 import numpy as np
 
 from guided_lgp.bounds.program.closed_form import HumanLike, human_like, inverse
-from guided_lgp.bounds.program.grasp import tool_target, tool_targets
+from guided_lgp.bounds.program.grasp import Hand, tool_target, tool_targets
 from guided_lgp.bounds.program.kinematics import ArmKinematics, Chain, RobotKinematics
 from guided_lgp.bounds.program.slots import HeldBox
 from guided_lgp.bounds.results import Array
 from guided_lgp.robots import Robot
 from guided_lgp.robots.inverse import inverse_kinematics
 
-INPUTS = 15
+INPUTS = 16
 """Arguments of a closed form, see :func:`_closed_form`."""
 _PANS = np.linspace(-0.65, 1.6, 10)
 """Values (rad) of the shoulder's pan that are tried, left arm: from the middle to its own side."""
@@ -28,20 +28,20 @@ _VALUES = 6
 _TURN = 2 * np.pi
 
 Evaluate = Callable[[str, Array], Array]
-"""Runs the closed form of a chain: its name and arguments (count, 15) to (count, n + 1)."""
+"""Runs the closed form of a chain: its name and arguments (count, 16) to (count, n + 1)."""
 
 
 class Reach(Protocol):
     """Inverse kinematics of one arm for starts, in the convention of its chain."""
 
     def __call__(
-        self, held: HeldBox, offset: float, poses: Array, pitches: Array, ends: Array
+        self, held: HeldBox, hand: Hand, poses: Array, pitches: Array, ends: Array
     ) -> tuple[Array, Array]:
         """Hold a box at poses.
 
         Args:
             held: the grasp's lengths and turn.
-            offset: of the tool along its z axis (m).
+            hand: offset of the tool along its z axis, and depth (m).
             poses: (N, 4) x, y, yaw and z of the box.
             pitches: (M,) of the approach (rad).
             ends: (E, 2) back along the approach and up (m); the first is the contact.
@@ -62,21 +62,21 @@ class ClosedForm:
         self._evaluate = evaluate
 
     def __call__(
-        self, held: HeldBox, offset: float, poses: Array, pitches: Array, ends: Array
+        self, held: HeldBox, hand: Hand, poses: Array, pitches: Array, ends: Array
     ) -> tuple[Array, Array]:
         """See :class:`Reach`."""
         shape = (len(poses), len(pitches), len(ends), 2 * len(_PANS))
         arguments = np.empty((*shape, INPUTS))
         arguments[..., :4] = poses[:, None, None, None]
         arguments[..., 4] = pitches[:, None, None]
-        arguments[..., 5] = offset
-        arguments[..., 6] = np.tile(_PANS, 2)
-        arguments[..., 7] = np.repeat([1.0, -1.0], len(_PANS))
-        arguments[..., 8] = self._arm.side
-        arguments[..., 9] = self._lifted
-        arguments[..., 10] = ends[:, 1, None]
-        arguments[..., 11:14] = held.half_length, held.half_height, held.turn
-        arguments[..., 14] = ends[:, 0, None]
+        arguments[..., 5:7] = hand
+        arguments[..., 7] = np.tile(_PANS, 2)
+        arguments[..., 8] = np.repeat([1.0, -1.0], len(_PANS))
+        arguments[..., 9] = self._arm.side
+        arguments[..., 10] = self._lifted
+        arguments[..., 11] = ends[:, 1, None]
+        arguments[..., 12:15] = held.half_length, held.half_height, held.turn
+        arguments[..., 15] = ends[:, 0, None]
         found = self._evaluate(self._arm.chain.name, arguments.reshape(-1, INPUTS))
         solutions = found.reshape(*shape, -1)
         return solutions[..., :-1], solutions[..., -1]
@@ -94,10 +94,10 @@ class General:
         self._values = self._solver.redundancies(_VALUES)
 
     def __call__(
-        self, held: HeldBox, offset: float, poses: Array, pitches: Array, ends: Array
+        self, held: HeldBox, hand: Hand, poses: Array, pitches: Array, ends: Array
     ) -> tuple[Array, Array]:
         """See :class:`Reach`; every branch at the contact goes on on the nearest at the ends."""
-        rotation, position = tool_targets(held, offset, poses, pitches, ends, self._arm.palm_front)
+        rotation, position = tool_targets(held, hand, poses, pitches, ends, self._arm.palm_front)
         q, missing = self._solver.nearest(
             rotation[..., None, :, :], position[..., None, :], self._values
         )
@@ -165,11 +165,12 @@ def closed_forms(kinematics: RobotKinematics) -> dict[str, Any]:
 def _closed_form(chain: Chain, lengths: HumanLike) -> Any:
     """CasADi function of one closed-form inverse kinematics.
 
-    Inputs (15,): pose (x, y, yaw) and height of the box, pitch, offset, shoulder pan, branch, side,
-    lift of the shoulder, lift above the box's place, half length, half height, turn, distance back.
+    Inputs (16,): pose (x, y, yaw) and height of the box; pitch, offset, depth; shoulder pan,
+    branch, side; lift of the shoulder; lift above the box's place; half length, half height, turn,
+    distance back.
     Outputs (8,): joint values (mirrored for a mirror image) and the distance missing to reach (m).
     """
     x = ca.SX.sym("x", INPUTS)
-    position, rotation = tool_target(x[:3], x[3] + x[10], x[4], x[5], x[11:15], chain.palm_front)
-    solution = inverse(lengths, position, rotation, x[6], x[7], x[8], x[9])
+    position, rotation = tool_target(x[:3], x[3] + x[11], x[4:7], x[12:16], chain.palm_front)
+    solution = inverse(lengths, position, rotation, x[7], x[8], x[9], x[10])
     return ca.Function(f"reach_{chain.name}", [x], [solution])

@@ -58,17 +58,23 @@ class ArmConfiguration:
 
 @dataclass(eq=False)
 class HeldBox:
-    """A box in a gripper, from its grasp to the end of it: one pitch and offset of the hand."""
+    """A box in a gripper, from its grasp to the end of it: one way in which the hand holds it."""
 
     gripper: str
     box: str
     pitch: int
     offset: int
+    depth: int
     turn: float
     """Of the box's length against its x axis (rad)."""
     half_length: float
     half_height: float
     configurations: list[ArmConfiguration] = field(default_factory=list)
+
+    @property
+    def grip(self) -> tuple[int, int, int]:
+        """Slots of pitch, offset and depth."""
+        return self.pitch, self.offset, self.depth
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,8 @@
 """``hold(gripper, box)``: the gripper is where its grasp of the box wants it.
 
-A grasped box is rigid in the gripper from its grasp on, until it hangs on something else: one pitch
-and one offset of the hand for the whole mode. The arm's joints are variables of each configuration,
-and of the far end of each straight way to it or from it.
+A grasped box is rigid in the gripper from its grasp on, until it hangs on something else: one
+pitch, offset and depth of the hand for the whole mode. The arm's joints are variables of each
+configuration, and of the far end of each straight way to it or from it.
 """
 
 from collections.abc import Iterable
@@ -13,7 +13,7 @@ import numpy as np
 from guided_lgp.bounds.checks import Pose, Vector, angle_of, axes_of, dot, offset_of
 from guided_lgp.bounds.program.context import Context, Line
 from guided_lgp.bounds.program.draft import Draft
-from guided_lgp.bounds.program.grasp import tool_target
+from guided_lgp.bounds.program.grasp import INSET, PALM_GAP, tool_target
 from guided_lgp.bounds.program.kernels import SCALE, Kernel, kernel
 from guided_lgp.bounds.program.kinematics import Chain, RobotKinematics
 from guided_lgp.bounds.program.slots import (
@@ -27,8 +27,6 @@ from guided_lgp.bounds.terms.term import Term, UngraspableError
 from guided_lgp.scene.model import grasp_axis
 from guided_lgp.scene.tolerances import MARGIN
 
-PAD_MARGIN = 0.01
-"""How far inside the box's side the fingertips are (m)."""
 GRASP_OFFSET = 0.003
 """How far (m) a grasped box may be off the middle between the fingers."""
 GRASP_ANGLE = 0.03
@@ -42,14 +40,12 @@ def _kernel(chain: Chain, fixed: int) -> Kernel:
     together at the target only.
     """
     n = len(chain.moving)
-    x, p = ca.SX.sym("x", n + 6), ca.SX.sym("p", 7 + fixed)
-    q, pitch, offset, pose, z = x[:n], x[n], x[n + 1], x[n + 2 : n + 5], x[n + 5]
+    x, p = ca.SX.sym("x", n + 7), ca.SX.sym("p", 7 + fixed)
+    q, grip, pose, z = x[:n], x[n : n + 3], x[n + 3 : n + 6], x[n + 6]
     side, scene, (z_offset, up) = p[0], p[1 : 1 + fixed], (p[1 + fixed], p[2 + fixed])
     arm = chain.pose(q, side, scene)
     grasp = p[3 + fixed : 7 + fixed]
-    position, rotation = tool_target(
-        pose, z + z_offset + up, pitch, offset, grasp, chain.palm_front
-    )
+    position, rotation = tool_target(pose, z + z_offset + up, grip, grasp, chain.palm_front)
     c = ca.vertcat(
         SCALE * (arm.position - position),
         arm.rotation[:, 1] - rotation[:, 1],
@@ -93,16 +89,18 @@ def grip(context: Context, gripper: str, box: str) -> HeldBox:
 
 def _new_grip(context: Context, gripper: str, box: str) -> HeldBox:
     turn, along, width = context.geometry.grasp_side(box)
-    widest = context.robot.arms[gripper].arm.fingers.grasp_width
-    if width > widest:
-        raise UngraspableError(context.action, box, width - widest)
+    arm = context.robot.arms[gripper].arm
+    if width > arm.fingers.grasp_width:
+        raise UngraspableError(context.action, box, width - arm.fingers.grasp_width)
     height = context.half(box)[2]
-    slide = max(along, height) - PAD_MARGIN
+    slide = max(along, height) - INSET
+    deepest = max(PALM_GAP, INSET - arm.palm_front - 2 * min(along, height))
     return HeldBox(
         gripper,
         box,
         pitch=context.program.variable(0.0, np.pi, 1e-3, np.pi / 2),
         offset=context.program.variable(-slide, slide, 0.05, 0.0),
+        depth=context.program.variable(PALM_GAP, max(deepest, -arm.palm_front), 0.05, deepest),
         turn=turn,
         half_length=along,
         half_height=height,
@@ -153,7 +151,7 @@ def _rows(
     grasp = (held.half_length, held.half_height, held.turn, back)
     context.rows(
         f"hold_{arm.chain.name}",
-        (*joints, held.pitch, held.offset, *pose.plane, pose.z),
+        (*joints, *held.grip, *pose.plane, pose.z),
         (*context.arm_parameters(arm), pose.offset, up, *grasp),
         ("hold", held.gripper, held.box),
     )
@@ -217,8 +215,8 @@ def _solutions(
     """
     arm = draft.robot.arms[held.gripper]
     ends = np.array([(0.0, 0.0), *((segment.back, segment.up) for segment in segments)])
-    offset = float(draft.values[held.offset])
-    joints, missing = draft.reach[held.gripper](held, offset, poses, tried, ends)
+    offset, depth = draft.values[[held.offset, held.depth]].tolist()
+    joints, missing = draft.reach[held.gripper](held, (offset, depth), poses, tried, ends)
     low, high = np.array(arm.limits).T
     beyond = np.maximum(low - joints, 0) + np.maximum(joints - high, 0)
     motion = ((joints - arm.home) ** 2)[..., :_SHOULDER_JOINTS].sum(axis=-1)
