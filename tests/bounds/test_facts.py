@@ -115,10 +115,21 @@ def test_the_solver_finds_nothing_that_a_fact_denies(monkeypatch: pytest.MonkeyP
         assert [r.feasible for r in with_facts] == [r.feasible for r in without]
 
 
-def test_a_denied_skeleton_costs_no_start(scene: Scene) -> None:
+def test_a_denied_skeleton_counts_no_start(scene: Scene) -> None:
     result = CoarseBound(scene, 12).solve(parse_skeleton("(grasp pr2L blue)"))
     assert (result.feasible, result.restarts) == (False, 0)
     assert result.failure is not None
     assert str(result.failure) == (
         "action 1: hold pr2L blue violated (proved for the arm alone, collisions left out)"
     )
+
+
+def test_a_fact_is_proved_only_where_a_start_fails(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    proved: list[Limb] = []
+    monkeypatch.setattr(Limb, "cannot", lambda limb, grasp: bool(proved.append(limb)) or True)
+    assert CoarseBound(scene, 12).solve(parse_skeleton("(grasp pr2L red)")).feasible
+    assert not proved
+    assert not CoarseBound(scene, 12).solve(parse_skeleton("(grasp pr2L blue)")).feasible
+    assert proved

@@ -33,7 +33,7 @@ from guided_lgp.params import BoundsParams, EnumerateSequences, Params
 from guided_lgp.paths import PIPELINE, SCENES, SEQUENCES
 from guided_lgp.scene import Scene, load_scenes
 from guided_lgp.search.enumerate import Enumeration, enumerate_sequences
-from guided_lgp.search.observation import observe, start
+from guided_lgp.search.observation import observe_all, start
 from guided_lgp.sequences import SHORTEST, STAGE, VERDICTS
 from guided_lgp.tables import read_columns, write_table
 
@@ -170,7 +170,7 @@ def shortest_table(scene: Scene, found: Enumeration) -> pa.Table:
 
 def _states(scene: Scene, verdict: CoarseResult) -> list[float]:
     keyframes = (start(scene), *verdict.after_action)
-    positions = [list(observe(scene, keyframe).values()) for keyframe in keyframes]
+    positions = [list(state.values()) for state in observe_all(scene, keyframes)]
     flat: list[float] = np.array(positions).ravel().tolist()
     return flat
 

@@ -1,5 +1,7 @@
 """What a policy sees: world positions of all symbols (paper, Sec. II, state s_k)."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from guided_lgp.bounds.results import Array, Keyframe
@@ -15,8 +17,18 @@ def start(scene: Scene) -> Keyframe:
 
 def observe(scene: Scene, keyframe: Keyframe) -> dict[str, Array]:
     """The state s_k: position (3,) in m of every symbol, grippers, boxes, then surfaces."""
+    return observe_all(scene, [keyframe])[0]
+
+
+def observe_all(scene: Scene, keyframes: Sequence[Keyframe]) -> list[dict[str, Array]]:
+    """The states of many keyframes; the arms are mostly where they were before."""
     symbols = scene.symbols
-    grippers = {name: scene.robot.tool_pose(keyframe.q, name)[:3] for name in symbols.grippers}
-    boxes = {name: np.asarray(keyframe.boxes[name])[:3] for name in symbols.boxes}
+    postures, which = np.unique([k.q for k in keyframes], axis=0, return_inverse=True)
+    tools = scene.robot.tool_poses(postures, symbols.grippers)
     surfaces = {table.name: np.array(table.position) for table in scene.tables}
-    return grippers | boxes | surfaces
+    return [
+        {name: tools[name][posture, :3] for name in symbols.grippers}
+        | {name: np.asarray(keyframe.boxes[name])[:3] for name in symbols.boxes}
+        | surfaces
+        for keyframe, posture in zip(keyframes, which, strict=True)
+    ]

@@ -107,13 +107,19 @@ class CoarseBound:
                 return
 
     def _search(self, skeleton: Skeleton, prefix: CoarseSolution | None) -> CoarseSolution:
-        """Start after start until one leads to a verified solution, unless a fact forbids it."""
-        if fact := self.facts.impossible(skeleton):
-            failure = Failure(len(skeleton) - 1, str(fact), np.nan, _PROVED)
-            return CoarseSolution(skeleton, feasible=False, failure=failure, restarts=0)
+        """Start after start until one leads to a verified solution, unless a fact forbids it.
+
+        A fact that has to be proved first is worth its time when the first start has failed.
+        """
+        fact = self.facts.known(skeleton)
         programs = _Programs(self._geometry, skeleton)
         failures: list[Failure] = []
         for number in range(self._restarts):
+            if number == 1:
+                fact = self.facts.impossible(skeleton)
+            if fact:
+                failure = Failure(len(skeleton) - 1, str(fact), np.nan, _PROVED)
+                return CoarseSolution(skeleton, feasible=False, failure=failure, restarts=0)
             try:
                 result = self._restart(programs, number, prefix)
             except UngraspableError as error:

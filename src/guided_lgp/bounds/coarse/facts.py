@@ -51,6 +51,10 @@ class Facts:
         """What makes the last action of a skeleton impossible, as far as facts go."""
         return next(filter(self.out_of_reach, self._holds(skeleton)), None)
 
+    def known(self, skeleton: Skeleton) -> Hold | None:
+        """The same, as far as it has been asked for before: takes no time."""
+        return next((hold for hold in self._holds(skeleton) if self._known.get(hold)), None)
+
     def out_of_reach(self, hold: Hold) -> bool:
         """Whether the arm cannot do it, collisions aside; boxes too wide for the fingers aside."""
         if hold not in self._known:
@@ -64,7 +68,7 @@ class Facts:
 
     def _holds(self, skeleton: Skeleton) -> Iterator[Hold]:
         """What the last action asks of its arms, where it is known where its body stands."""
-        *before, last = map(self._geometry.scene.symbols.domain.bind, skeleton)
+        *before, last = map(self._geometry.domain.bind, skeleton)
         moved, loaded = self._moved(before, last.body)
         if last.parent not in self._arms:
             if last.parent not in moved:
