@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from guided_lgp.bounds.results import Array, Keyframe
-from guided_lgp.poses import pose
+from guided_lgp.poses import pose, yaw_of
 from guided_lgp.scene import Scene
 
 
@@ -32,3 +32,15 @@ def observe_all(scene: Scene, keyframes: Sequence[Keyframe]) -> list[dict[str, A
         | surfaces
         for keyframe, posture in zip(keyframes, which, strict=True)
     ]
+
+
+def shapes(scene: Scene, keyframe: Keyframe) -> dict[str, Array]:
+    """Half extents (m) and yaw (rad), (4,), of every box and surface."""
+    boxes = {
+        box.name: np.array([*np.divide(box.size, 2), float(yaw_of(keyframe.boxes[box.name]))])
+        for box in scene.boxes
+    }
+    surfaces = {
+        table.name: np.array([*table.half_extents, 0.0, table.yaw]) for table in scene.tables
+    }
+    return boxes | surfaces

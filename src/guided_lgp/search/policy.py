@@ -1,7 +1,7 @@
 """What a planner needs of a policy: a probability over actions, as a protocol."""
 
 from collections.abc import Mapping, Sequence
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -33,6 +33,15 @@ class Policy(Protocol):
         Returns:
             (len(actions),) natural logarithms of the policy's probabilities.
         """
+        ...
+
+
+@runtime_checkable
+class SeeingPolicy(Policy, Protocol):
+    """A policy that may see more than positions."""
+
+    def given(self, shapes: Mapping[str, Array]) -> Policy:
+        """The policy where half extents (m) and yaw (rad), (4,), of boxes and tables are known."""
         ...
 
 

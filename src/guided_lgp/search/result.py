@@ -10,6 +10,7 @@ from typing import Literal, TypeVar
 from guided_lgp.bounds.deadline import OutOfTimeError
 from guided_lgp.bounds.results import Array, CoarseResult, Failure, PathResult
 from guided_lgp.logic import Action, Objective, Skeleton, State, Symbols, format_skeleton
+from guided_lgp.search.policy import Policy
 from guided_lgp.search.problem import Problem
 
 Verdict = TypeVar("Verdict", CoarseResult, PathResult)
@@ -126,7 +127,6 @@ class Run:
     def __init__(self, problem: Problem) -> None:
         self._bounds = problem.bounds
         self._part = problem.parts.part
-        self._policy = problem.policy
         self._limits = problem.limits
         self._deadline = problem.deadline
         self._cut_off = False
@@ -207,16 +207,16 @@ class Run:
 
     def log_probabilities(
         self,
+        policy: Policy,
         objective: Objective,
         state: State,
         symbols: Symbols,
         positions: Mapping[str, Array],
         actions: Sequence[Action],
     ) -> Array:
-        """The policy's scores of the actions; see :class:`~guided_lgp.search.policy.Policy`."""
-        assert self._policy is not None
+        """A policy's scores of the actions; see :class:`~guided_lgp.search.policy.Policy`."""
         start = time.perf_counter()
-        scores = self._policy.log_probabilities(objective, state, symbols, positions, actions)
+        scores = policy.log_probabilities(objective, state, symbols, positions, actions)
         elapsed = time.perf_counter() - start
         self._policy_s += elapsed
         self._waited += elapsed

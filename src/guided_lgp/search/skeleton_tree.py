@@ -9,11 +9,13 @@ from guided_lgp.logic import (
     Skeleton,
     State,
     applicable_actions,
+    progress,
     satisfied,
     successor,
     unsatisfied,
 )
-from guided_lgp.search.observation import observe, start
+from guided_lgp.search.observation import observe, shapes, start
+from guided_lgp.search.policy import SeeingPolicy
 from guided_lgp.search.problem import Problem
 from guided_lgp.search.result import Limit, Reason, Run, SearchResult
 
@@ -34,12 +36,15 @@ class Node:
 
 
 class SkeletonTree:
-    """The nodes generated so far; a policy, if there is one, scores the children of each."""
+    """The nodes generated so far, from a sequence that is given, as a rule the empty one.
 
-    def __init__(self, problem: Problem) -> None:
+    A policy, if there is one, scores the children of each.
+    """
+
+    def __init__(self, problem: Problem, prefix: Skeleton = ()) -> None:
         self.problem = problem
         self.run = Run(problem)
-        self.root = Node(0, (), problem.scene.state)
+        self.root = Node(0, prefix, progress(problem.scene.state, prefix))
         self.size = 1
 
     def satisfied(self, node: Node) -> bool:
@@ -80,13 +85,15 @@ class SkeletonTree:
     def _scores(
         self, node: Node, configuration: Keyframe, actions: Sequence[Action]
     ) -> Sequence[float]:
-        problem = self.problem
-        if problem.policy is None:
+        problem, policy = self.problem, self.problem.policy
+        if policy is None:
             return [0.0] * len(actions)
+        if isinstance(policy, SeeingPolicy):
+            policy = policy.given(shapes(problem.scene, configuration))
         goals = unsatisfied(node.state, problem.objective) if problem.adapt else problem.objective
         positions = observe(problem.scene, configuration)
         scores: list[float] = self.run.log_probabilities(
-            goals, node.state, problem.scene.symbols, positions, actions
+            policy, goals, node.state, problem.scene.symbols, positions, actions
         ).tolist()
         return scores
 

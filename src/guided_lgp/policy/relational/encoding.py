@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from guided_lgp.logic import Domain, Objective, State, Symbols
 from guided_lgp.policy.arrays import BoolArray, FloatArray, IntArray
+from guided_lgp.policy.relational.geometry import BLIND, Sight, edge_inputs, node_inputs
 
 NO_GOAL = -1
 GOAL_HELD = -2
@@ -69,16 +70,20 @@ class Situations:
     """
 
     positions: FloatArray
-    """(B, T, 3) in m, in the world."""
+    """(B, T, 3) in m, in the world: of the centres, or of the middle of each bottom where there are
+    shapes."""
     supports: IntArray
     """(B, n) what each box stands on; -1 - g when held by gripper g."""
     goals: IntArray
     """(B, n) what each box shall stand on, or :data:`GOAL_HELD`, or :data:`NO_GOAL`."""
     grippers: int
+    shapes: FloatArray | None = None
+    """(B, T, 4) half extents (m) and yaw (rad), for a policy that sees them."""
 
     def __getitem__(self, rows: IntArray | BoolArray) -> "Situations":
         positions, supports = self.positions[rows], self.supports[rows]
-        return Situations(positions, supports, self.goals[rows], self.grippers)
+        shapes = None if self.shapes is None else self.shapes[rows]
+        return Situations(positions, supports, self.goals[rows], self.grippers, shapes)
 
 
 @dataclass(frozen=True)
@@ -86,9 +91,9 @@ class Graphs:
     """The inputs of the network; G graphs per problem, one for each gripper."""
 
     nodes: FloatArray
-    """(B, G, T, node features)."""
+    """(B, G, T, node features), what is seen of sizes last."""
     edges: FloatArray
-    """(B, T, T, edge features), the same for all grippers."""
+    """(B, T, T, edge features), the same for all grippers; what is seen of distances last."""
     held: IntArray
     """(B, G) the table number of the box that the gripper holds, or -1."""
 
@@ -131,6 +136,7 @@ def situation(
     state: State,
     positions: Mapping[str, NDArray[np.float64]],
     symbols: Symbols,
+    shapes: Mapping[str, NDArray[np.float64]] | None = None,
 ) -> Situations:
     """One problem (B = 1).
 
@@ -139,6 +145,7 @@ def situation(
         state: the symbolic state.
         positions: world position (3,) in m of every symbol.
         symbols: grippers, boxes and surfaces.
+        shapes: half extents (m) and yaw (rad), (4,), of all that has some.
     """
     tables = symbols.surfaces + symbols.boxes
     number = {name: index for index, name in enumerate(tables)}
@@ -148,11 +155,17 @@ def situation(
     goals |= {
         goal.symbols[0]: GOAL_HELD for goal in objective if is_held(symbols.domain, goal.kind)
     }
+    where = np.array([[positions[name] for name in tables]], dtype=np.float32)
+    forms = None
+    if shapes is not None:
+        forms = np.array([[shapes[name] for name in tables]], dtype=np.float32)
+        where[..., 2] -= forms[..., 2]
     return Situations(
-        positions=np.array([[positions[name] for name in tables]], dtype=np.float32),
+        positions=where,
         supports=np.array([[place[box] for box in symbols.boxes]]),
         goals=np.array([[goals.get(box, NO_GOAL) for box in symbols.boxes]]),
         grippers=len(symbols.grippers),
+        shapes=forms,
     )
 
 
@@ -162,8 +175,8 @@ def is_held(domain: Domain, kind: str) -> bool:
     return condition.predicate == "held"
 
 
-def graphs(situations: Situations, limits: Range) -> Graphs:
-    """Build the graphs of all problems, one per gripper."""
+def graphs(situations: Situations, limits: Range, sight: Sight = BLIND) -> Graphs:
+    """Build the graphs of all problems, one per gripper, with what is seen of the geometry."""
     supports, goals = situations.supports, situations.goals
     boxes, tables = supports.shape[1], situations.positions.shape[1]
     holder = np.stack([supports == -1 - gripper for gripper in range(situations.grippers)], axis=1)
@@ -204,7 +217,14 @@ def graphs(situations: Situations, limits: Range) -> Graphs:
         hands = [of_tables(holder[:, gripper]), of_tables(by_other)]
         flags = np.stack([*hands, *symbolic, *arms], axis=-1, dtype=np.float32)
         by_gripper.append(np.concatenate([position, flags], axis=-1))
+        if sight.nodes and situations.shapes is not None:
+            seen = node_inputs(situations.shapes, float(side), sight)
+            by_gripper[-1] = np.concatenate([by_gripper[-1], seen], axis=-1)
     relations = np.stack([on, np.swapaxes(on, 1, 2), above, carried, shall], axis=-1)
+    if sight.edges and situations.shapes is not None:
+        standing = of_tables(supports >= 0) > 0
+        seen = edge_inputs(situations.positions, situations.shapes, standing, sight)
+        relations = np.concatenate([relations, seen], axis=-1)
     return Graphs(
         nodes=np.stack(by_gripper, axis=1),
         edges=relations,

@@ -8,15 +8,23 @@ from numpy.typing import NDArray
 
 from guided_lgp.logic import Action, Objective, State, Symbols
 from guided_lgp.policy.relational.encoding import graphs, situation
+from guided_lgp.policy.relational.geometry import BLIND
 from guided_lgp.policy.relational.heads import heads
 from guided_lgp.policy.relational.model import Weights, load_weights
+
+Shapes = Mapping[str, NDArray[np.float64]]
 
 
 class RelationalPolicy:
     """Scores actions on any number of boxes and tables, with any number of goals."""
 
-    def __init__(self, weights: Weights) -> None:
+    def __init__(self, weights: Weights, shapes: Shapes | None = None) -> None:
         self._weights = weights
+        self._shapes = shapes
+
+    def given(self, shapes: Shapes) -> "RelationalPolicy":
+        """The same policy where half extents (m) and yaw (rad), (4,), of all bodies are known."""
+        return self if self._weights.sight == BLIND else RelationalPolicy(self._weights, shapes)
 
     @property
     def instructions(self) -> Collection[str]:
@@ -32,8 +40,8 @@ class RelationalPolicy:
         actions: Sequence[Action],
     ) -> NDArray[np.float64]:
         """Score applicable actions; see :class:`guided_lgp.search.policy.Policy`."""
-        problem = situation(objective, state, positions, symbols)
-        scores = self._weights.scores(graphs(problem, self._weights.limits))
+        problem = situation(objective, state, positions, symbols, self._shapes)
+        scores = self._weights.scores(graphs(problem, self._weights.limits, self._weights.sight))
         gripper = {name: row for row, name in enumerate(symbols.grippers)}
         table = {name: column for column, name in enumerate(symbols.tables)}
         known = heads(self._weights.domain)

@@ -16,6 +16,7 @@ from guided_lgp.faults import first_fault
 from guided_lgp.logic import Domain
 from guided_lgp.policy.arrays import BoolArray, FloatArray
 from guided_lgp.policy.relational.encoding import EDGE_FEATURES, NODE_FEATURES, Graphs, Range
+from guided_lgp.policy.relational.geometry import BLIND, Sight
 from guided_lgp.policy.relational.heads import Head, heads
 from guided_lgp.policy.tensors import read_weights, write_tensors
 
@@ -33,6 +34,8 @@ class Weights:
     tensors: Mapping[str, FloatArray]
     domain: Domain
     """Whose instructions have heads."""
+    sight: Sight = BLIND
+    """What it sees beside relations."""
 
     @property
     def width(self) -> int:
@@ -123,9 +126,11 @@ def _relu(values: FloatArray) -> FloatArray:
     return np.maximum(values, 0)
 
 
-def shapes(width: int, rounds: int, heads: Mapping[str, Head]) -> dict[str, tuple[int, ...]]:
+def shapes(
+    width: int, rounds: int, heads: Mapping[str, Head], sight: Sight = BLIND
+) -> dict[str, tuple[int, ...]]:
     """The shape of every parameter of a network."""
-    nodes, edges = len(NODE_FEATURES), len(EDGE_FEATURES)
+    nodes, edges = len(NODE_FEATURES + sight.nodes), len(EDGE_FEATURES + sight.edges)
     layers = {"embed": (width, nodes), "pool": (width, width)}
     for index in range(rounds):
         layers[f"receive.{index}"] = layers[f"update.{index}"] = (width, width)
@@ -159,8 +164,8 @@ class Model:
             **({} if self.weights.domain.name == PAPER else {"domain": self.weights.domain.name}),
             "width": self.weights.width,
             "rounds": self.weights.rounds,
-            "nodes": list(NODE_FEATURES),
-            "edges": list(EDGE_FEATURES),
+            "nodes": list(NODE_FEATURES + self.weights.sight.nodes),
+            "edges": list(EDGE_FEATURES + self.weights.sight.edges),
             "limits": asdict(self.weights.limits),
             "training": self.training,
         }
@@ -208,13 +213,22 @@ def load_weights(directory: Path) -> Weights:
         document = _Document.model_validate(read_json(path, _REMEDY))
     except ValidationError as error:
         raise first_fault(error, str(path), _REMEDY) from None
-    if (document.nodes, document.edges) != (list(NODE_FEATURES), list(EDGE_FEATURES)):
-        raise InputError(f"{path}: nodes, edges", "are not what this program encodes", _REMEDY)
+    sight = _sight(document, path)
     limits = Range(tuple(document.limits.lower), tuple(document.limits.upper))
     domain = load_domain(document.domain)
     path = directory / f"{NAME}.safetensors"
     tensors = read_weights(path, _REMEDY)
-    expected = shapes(document.width, document.rounds, heads(domain))
+    expected = shapes(document.width, document.rounds, heads(domain), sight)
     if {name: tensor.shape for name, tensor in tensors.items()} != expected:
         raise InputError(str(path), "does not have the weights that its JSON describes", _REMEDY)
-    return Weights(limits, tensors, domain)
+    return Weights(limits, tensors, domain, sight)
+
+
+def _sight(document: _Document, path: Path) -> Sight:
+    """What the network sees beside the relations, which all see."""
+    nodes, edges = len(NODE_FEATURES), len(EDGE_FEATURES)
+    seen = document.nodes[:nodes], document.edges[:edges]
+    sight = Sight(tuple(document.nodes[nodes:]), tuple(document.edges[edges:]))
+    if not sight.known or seen != (list(NODE_FEATURES), list(EDGE_FEATURES)):
+        raise InputError(f"{path}: nodes, edges", "are not what this program encodes", _REMEDY)
+    return sight

@@ -6,6 +6,7 @@ import torch
 from torch import Tensor, nn
 
 from guided_lgp.policy.relational.encoding import EDGE_FEATURES, NODE_FEATURES
+from guided_lgp.policy.relational.geometry import BLIND, Sight
 from guided_lgp.policy.relational.heads import Head
 
 
@@ -16,9 +17,11 @@ class RelationalNetwork(nn.Module):
     others there are that have nothing to say.
     """
 
-    def __init__(self, width: int, rounds: int, heads: Mapping[str, Head]) -> None:
+    def __init__(
+        self, width: int, rounds: int, heads: Mapping[str, Head], sight: Sight = BLIND
+    ) -> None:
         super().__init__()
-        nodes, edges = len(NODE_FEATURES), len(EDGE_FEATURES)
+        nodes, edges = len(NODE_FEATURES + sight.nodes), len(EDGE_FEATURES + sight.edges)
         self.embed = nn.Linear(nodes, width)
         self.receive = nn.ModuleList(nn.Linear(width, width) for _ in range(rounds))
         self.send = nn.ModuleList(nn.Linear(width, width, bias=False) for _ in range(rounds))

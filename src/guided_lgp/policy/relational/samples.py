@@ -38,13 +38,16 @@ class Examples:
     configuration: NDArray[np.int32]
     """(N,) index of the configuration."""
     domain: Domain
+    wrong: BoolArray | None = None
+    """(N, G, T) whether the action is known to be infeasible, if failures are known."""
 
     def __len__(self) -> int:
         return len(self.configuration)
 
     def __getitem__(self, rows: IntArray | BoolArray) -> "Examples":
         right, configuration = self.right[rows], self.configuration[rows]
-        return Examples(self.situations[rows], right, configuration, self.domain)
+        wrong = None if self.wrong is None else self.wrong[rows]
+        return Examples(self.situations[rows], right, configuration, self.domain, wrong)
 
 
 def examples(dataset: Dataset) -> Examples:
