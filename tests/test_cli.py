@@ -116,6 +116,7 @@ def test_heavy_packages_are_not_imported_for_help() -> None:
         (["plan", "none.json", "--goal", "(held red)"], "none.json: No such file"),
         (["view", "none.json"], "none.json: No such file"),
         (["view", str(ROOT / "README.md")], "README.md: is not JSON"),
+        (["view", str(SCENE), "--rerun", "plan.rrd"], "has no motion to record"),
         (["generate_scenes", "--params", "none.yaml"], "none.yaml: No such file"),
         (["mlflow", "ui", "--port", "0"], "--port"),
     ],

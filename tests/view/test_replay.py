@@ -14,10 +14,11 @@ from guided_lgp.poses import compose, inverse, pose
 from guided_lgp.scene import Scene, generate
 from guided_lgp.scene.world import COLOURS
 from guided_lgp.view import motion
+from guided_lgp.view.bodies import box_colours
 from guided_lgp.view.live import view
 from guided_lgp.view.motion import frames, play, steps
 from guided_lgp.view.replay import replay_html
-from guided_lgp.view.viewer import Viewer, box_colours
+from guided_lgp.view.viewer import Viewer
 from stand_ins import full_disk
 
 

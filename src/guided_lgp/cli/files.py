@@ -130,21 +130,39 @@ def view(
             metavar="N", help="TCP port on this machine alone (127.0.0.1).", min=1, max=65535
         ),
     ] = 8080,
+    rerun: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.rrd",
+            help="Write a plan's motion for the Rerun viewer instead.",
+            show_default="browser",
+        ),
+    ] = None,
 ) -> None:
     """Show a scene, or a plan in motion, in the browser until Ctrl-C.
 
     Example: guided-lgp view examples/three_boxes.json
 
     Example: guided-lgp view plan.json --port 8081
+
+    Example: guided-lgp view plan.json --rerun plan.rrd && rerun plan.rrd
     """
     from guided_lgp.bounds.plan_file import read_plan
     from guided_lgp.scene import load_scene
     from guided_lgp.scene.validate import validate_scene
     from guided_lgp.view.live import view as serve
+    from guided_lgp.view.recording import write_recording
 
+    target = destinations({"--rerun": rerun}, [file])["--rerun"]
     found = read_plan(file) if is_plan(file) else None
     scene = found.scene if found else load_scene(file)
     validate_scene(scene, str(file))
+    if target is not None:
+        if found is None:
+            raise InputError(str(file), "has no motion to record", "a plan written by plan --out")
+        write_recording(found.trajectory, scene, target, found.skeleton, found.goals)
+        typer.echo(f"written: {rerun}")
+        return
     serve(
         scene,
         found.trajectory if found else None,
