@@ -122,8 +122,8 @@ def test_an_arm_whose_box_carries_another_stays_level(bound: CoarseBound) -> Non
 
 
 def test_a_failure_names_constraint_and_action() -> None:
-    shelf = Table(name="shelf", position=(0.54, -0.2, 0.6), half_extents=(0.05, 0.05))
-    full = Box(name="full", size=SIZE, position=(0.54, -0.2, 0.65), on="shelf")
+    shelf = Table(name="shelf", position=(0.54, 0.0, 0.6), half_extents=(0.05, 0.05))
+    full = Box(name="full", size=SIZE, position=(0.54, 0.0, 0.65), on="shelf")
     scene = Scene(tables=(TABLES[0], shelf), boxes=(SCENE.boxes[0], full))
     result = CoarseBound(scene, 9).solve(parse_skeleton("(grasp pr2L red) (place pr2L red shelf)"))
     assert not result.feasible

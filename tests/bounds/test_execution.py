@@ -89,7 +89,7 @@ def test_plan_that_is_not_of_the_skeleton_is_not_executed(
 @pytest.mark.parametrize(("period", "stays"), [(0.08, True), (0.006, False)])
 def test_box_on_a_held_box_rides_by_friction_alone(period: float, stays: bool) -> None:
     """Carried gently it stays where it is, jerked away it falls."""
-    stacked = scene(red=(0.52, 0.30, 0.65, 0.2, "tab1"), green=(0.52, 0.30, 0.75, 1.77, "red"))
+    stacked = scene(red=(0.55, 0.35, 0.65, 0.0, "tab1"), green=(0.55, 0.35, 0.75, 1.57, "red"))
     box = stacked.boxes[0]
     tool = next(
         t for t in grasp_poses(box, PALM_FRONT) if compose(t, pose((1, 0, 0)))[2] - t[2] > -0.01

@@ -513,7 +513,7 @@ def test_grasp_from_afar(world: World, two_boxes: Scene) -> None:
 
 def test_stack_tipped_while_it_is_carried() -> None:
     """The hand grasps the lower box of two from its end and goes home, which tips it."""
-    stacked = scene(red=(0.52, 0.30, 0.65, 0.2, "tab1"), green=(0.52, 0.30, 0.75, 1.77, "red"))
+    stacked = scene(red=(0.55, 0.35, 0.65, 0.0, "tab1"), green=(0.55, 0.35, 0.75, 1.57, "red"))
     box = stacked.boxes[0]
     tool = next(
         t for t in grasp_poses(box, PALM_FRONT) if compose(t, pose((1, 0, 0)))[2] - t[2] > -0.01

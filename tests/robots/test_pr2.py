@@ -76,7 +76,10 @@ def test_limits_are_the_urdfs() -> None:
         if joints[name].get("type") == "continuous":
             assert index in PR2.continuous
         else:
-            bounds = [float(limit.get(side, "nan")) for side in ("lower", "upper")]
+            # what the real arm's safety controllers allow, not where its joints stop
+            soft = joints[name].find("safety_controller")
+            assert soft is not None
+            bounds = [float(soft.get(f"soft_{side}_limit", "nan")) for side in ("lower", "upper")]
             assert PR2.position_limits[index] == pytest.approx(bounds)
     for gripper in PR2.grippers:
         for name in PR2.arms[gripper].fingers.joints:

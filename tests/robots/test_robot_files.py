@@ -105,11 +105,11 @@ def test_an_arm_that_is_no_mirror_image_is_named(tmp_path: Path) -> None:
 
 def test_soft_limits_count_unless_the_file_says_otherwise(tmp_path: Path) -> None:
     file = changed(tmp_path, "pr2", "pr2R")
-    soft = file.read_text().replace("limits: hard", "limits: soft")
-    file.write_text(soft)
+    hard = file.read_text().replace("description:\n", "description:\n  limits: hard\n")
+    file.write_text(hard)
     left = load_robot(str(file)).arms["pr2L"]
-    assert left.limits[0].tolist() == [-0.564601836603, 2.1353981634]
-    assert load_robot("pr2").arms["pr2L"].limits[0].tolist() == [-0.714601836603, 2.2853981634]
+    assert left.limits[0].tolist() == [-0.714601836603, 2.2853981634]
+    assert load_robot("pr2").arms["pr2L"].limits[0].tolist() == [-0.564601836603, 2.1353981634]
 
 
 _JOINTS = ("shoulder_lift", "shoulder_pan", "upper_arm_roll", "elbow_flex")

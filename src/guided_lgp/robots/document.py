@@ -94,8 +94,6 @@ class OffsetShoulderDocument(Document):
     """From the wrist to the tool frame."""
     reach: Length
     """Radius around the shoulder in which tools are looked for."""
-    pans: tuple[Number, Number]
-    """Range of the pan joint in which solutions are looked for."""
 
 
 class SegmentsDocument(Document):

@@ -21,7 +21,7 @@ from guided_lgp.robots.inverse import inverse_kinematics
 
 INPUTS = 16
 """Arguments of a closed form, see :func:`_closed_form`."""
-_PANS = np.linspace(-0.65, 1.6, 10)
+_PANS = np.linspace(-0.55, 1.6, 10)
 """Values (rad) of the shoulder's pan that are tried, left arm: from the middle to its own side."""
 _VALUES = 6
 """Values of the redundant joint of any other arm, spread over its range."""

@@ -42,7 +42,7 @@ class OffsetShoulder:
         self._mirror = np.diag([1.0, signs[0], 1.0])
         self.shoulder = self._mirror @ np.array(lengths.shoulder) + np.array([0.0, 0.0, lift])
         self._limits = limits + np.array([1e-4, -1e-4])
-        self._limits[[3, 5], 1] = -_SINGULAR
+        self._limits[[3, 5], 1] = np.minimum(self._limits[[3, 5], 1], -_SINGULAR)
 
     def inverse(
         self, rotation: Array, position: Array, redundancy: Array
@@ -123,7 +123,8 @@ class OffsetShoulder:
 
     def redundancies(self, count: int) -> Array:
         """Values (count,) of the pan joint (rad) at which solutions are looked for."""
-        return np.asarray(np.linspace(*self._lengths.pans, count) * self._signs[0])
+        low, high = self._limits[0]
+        return np.asarray(np.linspace(low, high, count + 2)[1:-1] * self._signs[0])
 
     def forward(self, q: Array) -> tuple[Array, Array]:
         """Rotation (..., 3, 3) and origin (..., 3) of the tool frame in the robot's root.
