@@ -24,6 +24,7 @@ from bad_input import (
 )
 from hypothesis import given
 from hypothesis import strategies as st
+from pydantic import TypeAdapter
 from safetensors.numpy import load_file, save_file
 
 from guided_lgp.bounds.plan_file import read_plan
@@ -35,7 +36,7 @@ from guided_lgp.policy.paper.inference import load_networks
 from guided_lgp.policy.paper.model import Model, load_model
 from guided_lgp.policy.paper.samples import build_dataset
 from guided_lgp.policy.tensors import write_tensors
-from guided_lgp.report.inputs import read_object
+from guided_lgp.report.metrics import read_metrics
 from guided_lgp.scene import GeneratedScenes, generate, load_scene, load_scenes
 from guided_lgp.scene.setups import SETUPS
 from guided_lgp.sequences import SHORTEST, VERDICTS
@@ -46,6 +47,7 @@ SYMBOLS = load_domain().symbols(
 )
 OBJECTIVES = tuple(two_goal_objectives(SYMBOLS)[:5])
 STAGE = "some_stage"
+OBJECT = TypeAdapter(dict)
 
 
 @pytest.fixture(scope="module")
@@ -95,7 +97,7 @@ def test_deep_documents(
     assert answer(lambda: load_scene(scene), scene) is None
     assert answer(lambda: load_scenes(scene), scene) is None
     assert answer(lambda: read_plan(plan), plan) is None
-    assert answer(lambda: read_object(metrics, STAGE), metrics) is None
+    assert answer(lambda: read_metrics(metrics, STAGE, OBJECT), metrics) is None
     assert answer(lambda: load_dataset(target), samples) is None
     assert answer(lambda: load_model(target, "grasp"), model) is None
 
@@ -443,7 +445,7 @@ def finite(value: Any) -> bool:
 @given(document=odd_values | st.dictionaries(st.text(max_size=5), odd_values, max_size=3))
 def test_metrics(document: Any, folder: Path) -> None:
     file = write_json(folder / "metrics.json", document)
-    found = answer(lambda: read_object(file, STAGE), file)
+    found = answer(lambda: read_metrics(file, STAGE, OBJECT), file)
     assert (found is not None) == (isinstance(document, dict) and finite(document))
 
 

@@ -176,7 +176,8 @@ def failures(verdicts: pd.DataFrame, scenes: Mapping[str, Scene]) -> pd.DataFram
     Returns:
         Index: constraint, the most frequent first; columns: action, from 1.
     """
-    failed = verdicts[~verdicts["feasible"].astype(bool)]
+    explained = verdicts["failure_constraint"].notna() & verdicts["failure_action"].notna()
+    failed = verdicts[~verdicts["feasible"].astype(bool) & explained]
     pairs = zip(failed["failure_constraint"], failed["configuration"], strict=True)
     kinds = [constraint_kind(name, scenes[configuration]) for name, configuration in pairs]
     actions = failed["failure_action"].astype(int).to_numpy() + 1

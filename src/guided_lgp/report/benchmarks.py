@@ -5,7 +5,7 @@ from typing import Any
 
 from guided_lgp.experiments.problems import PROBLEMS
 from guided_lgp.report.cells import NONE, number, percent, search_time, solved_suffix
-from guided_lgp.report.inputs import Metrics
+from guided_lgp.report.metrics import Metrics
 from guided_lgp.report.scalability_tables import label
 from guided_lgp.report.style import NETWORKS
 from guided_lgp.report.table import Table

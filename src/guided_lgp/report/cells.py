@@ -2,7 +2,8 @@
 
 import math
 
-from guided_lgp.report.inputs import Metrics, all_solved
+from guided_lgp.report.inputs import all_solved
+from guided_lgp.report.metrics import Metrics
 
 NONE = "–"
 """Stands where there is no figure."""

@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from guided_lgp.report import paper
 from guided_lgp.report.analysis import NEW, RENAMED, SEEN
 from guided_lgp.report.cells import number, percent, search_time
-from guided_lgp.report.inputs import Metrics, all_solved, compared
+from guided_lgp.report.inputs import all_solved, compared
+from guided_lgp.report.metrics import Metrics
 from guided_lgp.report.scalability_figures import SOLVING
 from guided_lgp.search.planners import TABLE_3
 

@@ -7,20 +7,19 @@ from typing import Any
 
 import pandas as pd
 import pyarrow as pa
+from pydantic import TypeAdapter
 
-from guided_lgp.documents import read_json
-from guided_lgp.errors import InputError
 from guided_lgp.experiments.outcomes import GENERALIZATION, OUTCOMES, SCALABILITY
 from guided_lgp.experiments.problems import PROBLEMS, ProblemClass
 from guided_lgp.logic import format_objective, one_goal_objectives, two_goal_objectives
 from guided_lgp.paths import EVALUATION, METRICS, REPORTS, SCENES, SEQUENCES, TRAINING
+from guided_lgp.report import metrics as shapes
+from guided_lgp.report.metrics import Metrics, read_evaluations, read_metrics
 from guided_lgp.report.style import NETWORKS
 from guided_lgp.scene import GeneratedScenes, Scene, load_scenes
 from guided_lgp.search.planners import TABLE_1, TABLE_3
 from guided_lgp.sequences import read_verdicts
 from guided_lgp.tables import columns_of, read_columns
-
-Metrics = Mapping[str, Any]
 
 _VERDICTS = (
     "configuration",
@@ -118,10 +117,8 @@ def load_inputs(root: Path) -> Inputs:
     """
     metrics = root / METRICS
     geometry, spread = metrics / "geometry.json", root / REPORTS / "studies" / "spread.json"
-    generalization = read_object(metrics / "generalization.json", "evaluate_generalization")
+    generalization, scalability, timing = read_evaluations(root)
     evaluated = {variant.policy for name, variant in TABLE_1.items() if name in generalization}
-    stage = "compare_scalability"
-    scalability = read_object(metrics / "scalability.json", stage)
     scenes = {
         name: load_scenes(root / SCENES / f"{name}.json")
         for name in (
@@ -134,22 +131,26 @@ def load_inputs(root: Path) -> Inputs:
     return Inputs(
         generalization=generalization,
         scalability=mask_stopped(scalability, runs),
-        timing=mask_stopped(read_object(metrics / "scalability_timing.json", stage), runs),
+        timing=mask_stopped(timing, runs),
         training={
             policy: {
-                network: read_object(root / TRAINING / file, stage)
+                network: read_metrics(root / TRAINING / file, stage, shapes.TRAINING)
                 for network, (file, stage) in _TRAINING[policy].items()
             }
             for policy in _TRAINING
             if policy in evaluated
         },
-        geometry=read_object(geometry, "make bench") if geometry.exists() else None,
-        spread=read_object(spread, "make study") if spread.exists() else None,
+        geometry=_optional(geometry, "make bench", shapes.GEOMETRY),
+        spread=_optional(spread, "make study", shapes.SPREAD),
         scenes=scenes,
         verdicts=_verdicts(root, scenes),
         problems=_problems(root, scenes["test"]),
         runs=runs,
     )
+
+
+def _optional(path: Path, stage: str, shape: TypeAdapter[Any]) -> Metrics | None:
+    return read_metrics(path, stage, shape) if path.exists() else None
 
 
 def _verdicts(root: Path, scenes: Mapping[str, GeneratedScenes]) -> pd.DataFrame:
@@ -225,16 +226,3 @@ def mask_stopped(metrics: Metrics, runs: pd.DataFrame) -> Metrics:
         }
         for problem, planners in metrics.items()
     }
-
-
-def read_object(path: Path, stage: str) -> Metrics:
-    """Read a JSON object that a stage wrote.
-
-    Raises:
-        InputError: the file is missing or is not a JSON object.
-    """
-    remedy = f"the output of stage {stage}"
-    document = read_json(path, remedy)
-    if not isinstance(document, dict):
-        raise InputError(str(path), "is not a JSON object", remedy)
-    return document

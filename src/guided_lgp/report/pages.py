@@ -4,11 +4,11 @@ from pathlib import Path
 
 from guided_lgp.documents import write_text
 from guided_lgp.errors import InputError
-from guided_lgp.paths import METRICS, REPORTS
+from guided_lgp.paths import REPORTS
 from guided_lgp.report import paper
 from guided_lgp.report.drawing import save
 from guided_lgp.report.findings import many, pair, tree
-from guided_lgp.report.inputs import Metrics, read_object
+from guided_lgp.report.metrics import Metrics, read_evaluations
 from guided_lgp.report.scalability_figures import solved
 
 BEGIN = "<!-- findings: written by make repro -->"
@@ -40,9 +40,7 @@ def write_pages(root: Path) -> None:
         InputError: a table or metric, or a marker in the README, is missing, or a file cannot be
             written.
     """
-    metrics = read_object(root / METRICS / "scalability.json", "compare_scalability")
-    timing = read_object(root / METRICS / "scalability_timing.json", "compare_scalability")
-    shares = read_object(root / METRICS / "generalization.json", "evaluate_generalization")
+    shares, metrics, timing = read_evaluations(root)
     (root / IMAGES).mkdir(parents=True, exist_ok=True)
     save(solved(metrics), root / IMAGES, "solved")
     write_text(root / RESULTS, "\n".join([_INTRODUCTION, *_tables(root)]))

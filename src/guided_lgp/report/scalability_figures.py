@@ -11,7 +11,8 @@ from matplotlib.ticker import PercentFormatter
 
 from guided_lgp.report import paper
 from guided_lgp.report.drawing import STYLE, WIDTH, subplots
-from guided_lgp.report.inputs import Metrics, all_solved, compared
+from guided_lgp.report.inputs import all_solved, compared
+from guided_lgp.report.metrics import Metrics
 from guided_lgp.report.style import planner_style
 from guided_lgp.search.planners import RIVALS, TABLE_3
 

@@ -5,7 +5,8 @@ from collections.abc import Mapping
 from guided_lgp.experiments.problems import ProblemClass
 from guided_lgp.report import paper
 from guided_lgp.report.cells import NONE, number, search_time, solved_suffix, spread
-from guided_lgp.report.inputs import Metrics, all_solved, compared
+from guided_lgp.report.inputs import all_solved, compared
+from guided_lgp.report.metrics import Metrics
 from guided_lgp.report.table import Table
 from guided_lgp.search.planners import TABLE_3
 

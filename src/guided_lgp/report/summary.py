@@ -3,7 +3,8 @@
 from collections.abc import Mapping
 from statistics import fmean
 
-from guided_lgp.report.inputs import Inputs, Metrics, compared
+from guided_lgp.report.inputs import Inputs, compared
+from guided_lgp.report.metrics import Metrics
 
 PLANNERS = ("guided", "relational")
 """Of Table III: the paper's, and the one that ``plan`` uses first."""

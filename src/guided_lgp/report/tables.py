@@ -10,7 +10,7 @@ import pandas as pd
 from guided_lgp.report import paper
 from guided_lgp.report.analysis import NEW, RENAMED, SEEN
 from guided_lgp.report.cells import NONE, number, percent
-from guided_lgp.report.inputs import Metrics
+from guided_lgp.report.metrics import Metrics
 from guided_lgp.report.style import NETWORKS, POLICIES
 from guided_lgp.report.table import Table
 from guided_lgp.search.planners import TABLE_1

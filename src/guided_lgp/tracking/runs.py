@@ -13,7 +13,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
 
-from guided_lgp.errors import InputError, shortened
+from guided_lgp.errors import shortened
 from guided_lgp.params import Params
 from guided_lgp.tracking.database import (
     EXECUTION_TAG,
@@ -32,6 +32,7 @@ from guided_lgp.tracking.stage_files import (
     StageFiles,
     check_outputs,
     check_parameters,
+    read_lock,
     running_stage,
 )
 
@@ -69,15 +70,9 @@ def sync(params: Params) -> tuple[list[str], list[str]]:
         The stages recorded now, and those that had been recorded before.
 
     Raises:
-        InputError: there is no ``dvc.lock``, or an output or a parameter is not the one in it.
+        InputError: there is no good ``dvc.lock``, or an output or a parameter is not the one in it.
     """
-    from dvc.utils.serialize import load_yaml  # YAML 1.2, where 1e-05 is a number
-
-    lock = Path("dvc.lock")
-    if not lock.is_file():
-        raise InputError("dvc.lock", "not found: no stage has run here", "dvc repro first")
-    document = load_yaml(lock)
-    stages = [StageFiles.of(address, entry) for address, entry in document["stages"].items()]
+    stages = read_lock(Path("dvc.lock"))
     known = recorded_keys(prepare())
     missing = [stage for stage in stages if stage.key not in known]
     for stage in missing:

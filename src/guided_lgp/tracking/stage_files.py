@@ -7,7 +7,10 @@ from hashlib import md5, sha256
 from pathlib import Path
 from typing import Any
 
+from pydantic import BaseModel, ValidationError
+
 from guided_lgp.errors import InputError
+from guided_lgp.faults import first_fault
 from guided_lgp.params import Params
 from guided_lgp.paths import PARAMS
 from guided_lgp.tracking.metrics import flatten
@@ -40,6 +43,46 @@ class StageFiles:
             outputs={item["path"]: item.get("md5") for item in entry.get("outs", ())},
             parameters=entry.get("params", {}).get(PARAMS.name, {}),
         )
+
+
+class _File(BaseModel):
+    path: str
+    md5: str | None = None
+
+
+class _Entry(BaseModel):
+    cmd: str | list[str]
+    deps: list[_File] = []
+    params: dict[str, dict[str, Any]] = {}
+    outs: list[_File] = []
+
+
+class _Lock(BaseModel):
+    """What of ``dvc.lock`` is read here."""
+
+    stages: dict[str, _Entry]
+
+
+def read_lock(path: Path) -> list[StageFiles]:
+    """The stages in ``dvc.lock``.
+
+    Raises:
+        InputError: the file is missing or damaged.
+    """
+    from dvc.utils.serialize import ParseError, load_yaml  # YAML 1.2, where 1e-05 is a number
+
+    remedy = "dvc repro first"
+    if not path.is_file():
+        raise InputError(str(path), "not found: no stage has run here", remedy)
+    try:
+        document = _Lock.model_validate(load_yaml(path))
+    except ValidationError as error:
+        raise first_fault(error, str(path)) from None
+    except (ParseError, OSError, ValueError) as error:
+        raise InputError(
+            str(path), f"is not YAML: {' '.join(str(error).split())}", remedy
+        ) from None
+    return [StageFiles.of(name, entry.model_dump()) for name, entry in document.stages.items()]
 
 
 def running_stage(address: str) -> StageFiles:
