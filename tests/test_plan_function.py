@@ -120,12 +120,15 @@ def test_impossible_tasks_name_the_action_the_constraint_and_the_amount(
 def test_attempts_that_go_in_circles_are_told_apart_from_infeasible_ones() -> None:
     result = PlanningResult(
         scene=load_scene(EXAMPLES / "three_boxes.json"),
+        objective=OBJECTIVE,
         coarse=None,
         path=None,
         tree_size=30,
         expansions=9,
         policy_calls=9,
         coarse_calls=12,
+        infeasible_calls=5,
+        part_calls=0,
         path_calls=1,
         causes=("max_depth", "infeasible", "max_depth"),
         reattempts={},

@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 
 from guided_lgp.bounds.deadline import Deadline
+from guided_lgp.bounds.goals import GoalTerms
 from guided_lgp.bounds.results import PathResult
 from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.domains import load_domain
@@ -19,13 +20,15 @@ from guided_lgp.logic import (
     least_actions,
     parse_objective,
     satisfied,
-    validate_objective,
 )
+from guided_lgp.logic.objectives import asks_for_places, check_objective
 from guided_lgp.params import BoundsParams, PlanningParams, SearchLimits, load_planning
 from guided_lgp.paths import MODELS
 from guided_lgp.policy.registry import POLICIES, load_policy, missing_instructions
 from guided_lgp.scene import Scene, load_scene
+from guided_lgp.scene.goals import complete_objective, in_the_way
 from guided_lgp.scene.validate import validate_scene
+from guided_lgp.scene.world import initial_poses
 from guided_lgp.search.facts import out_of_reach
 from guided_lgp.search.planners import (
     DEFAULT_SEARCH,
@@ -60,6 +63,8 @@ class PlanningResult(SearchResult):
 
     scene: Scene
     """As planned in: with the domain whose instructions were used."""
+    objective: Objective
+    """The goals with what their texts left out."""
     solver_starts: int
     """Starts of the coarse bound's solver, over all sequences."""
     obstacles: tuple[Obstacle, ...] = ()
@@ -136,20 +141,30 @@ def plan(
         scene = scene.model_copy(update={"domain": load_domain(domain).name})
     goals = parse_objective([objective] if isinstance(objective, str) else map(str, objective))
     validate_scene(scene, where)
-    if goals and satisfied(scene.state, goals):
-        return _without_search(scene, PathResult((), feasible=True))
-    validate_objective(goals, scene.symbols, scene.state)
+    goals = complete_objective(goals, scene)
+    check_objective(goals, scene.symbols)
+    misplaced = _misplaced(scene, goals)
+    if goals and satisfied(scene.state, goals) and not misplaced:
+        return _without_search(scene, goals, PathResult((), feasible=True))
     params = params or load_planning()
     deadline = Deadline.after(timeout)
-    scene_bounds = SceneBounds(scene, params.bounds, deadline)
+    scene_bounds = SceneBounds(scene, params.bounds, deadline, goals)
     if fact := out_of_reach(scene, scene_bounds.facts, goals):
-        return _without_search(scene, None, fact)
+        return _without_search(scene, goals, None, fact)
     limits = _limits(params.compare_scalability, scene, goals, max_nodes)
     search, followed = _guidance(planner, policy, models, scene)
     observed = ObservedBounds(scene_bounds)
-    attempts = _Attempts(
-        Problem(scene, goals, limits, observed, followed, parts=scene_bounds, deadline=deadline)
+    problem = Problem(
+        scene,
+        goals,
+        limits,
+        observed,
+        followed,
+        misplaced=misplaced,
+        parts=scene_bounds,
+        deadline=deadline,
     )
+    attempts = _Attempts(problem)
     if chosen:
         return attempts.result(search.plan(attempts.first))
     widened = partial(attempts.widened, params.bounds)
@@ -168,7 +183,7 @@ class _Attempts:
         scene = widened_scene(problem.scene, problem.objective, params, problem.deadline)
         if scene is None:
             return None
-        bounds = SceneBounds(scene, params, problem.deadline)
+        bounds = SceneBounds(scene, params, problem.deadline, problem.objective)
         observed = ObservedBounds(bounds)
         self._last = replace(problem, scene=scene, bounds=observed, parts=bounds, policy=Uniform())
         return self._last
@@ -180,6 +195,7 @@ class _Attempts:
         return PlanningResult(
             **vars(found),
             scene=problem.scene,
+            objective=problem.objective,
             solver_starts=bounds.starts,
             obstacles=()
             if found.solved
@@ -207,6 +223,14 @@ def _guidance(
     return SEARCHES[WITHOUT_POLICY], Uniform()
 
 
+def _misplaced(scene: Scene, goals: Objective) -> dict[str, frozenset[str]]:
+    """Bodies that are not where goals want them, and for each what stands there."""
+    terms = GoalTerms.of(goals, scene.symbols.domain)
+    faults = terms.faults(scene, initial_poses(scene))
+    bodies = sorted({fault.constraint.split()[1] for fault in faults})
+    return {body: in_the_way(body, goals, scene) for body in bodies}
+
+
 def _limits(
     limits: SearchLimits,
     scene: Scene,
@@ -216,6 +240,7 @@ def _limits(
     """Limits that follow the task: those of the experiments, or more where it needs more."""
     lower_bound = least_actions(scene.state, goals, scene.symbols)
     least = 0 if math.isinf(lower_bound) else int(lower_bound)
+    least = max(least, 2) if asks_for_places(goals, scene.symbols) else least
     changed = {
         "max_depth": max(limits.max_depth, 2 * least),
         "max_sequences": limits.max_sequences + SEQUENCES_PER_ACTION * least,
@@ -225,11 +250,12 @@ def _limits(
 
 
 def _without_search(
-    scene: Scene, path: PathResult | None, fact: str | None = None
+    scene: Scene, goals: Objective, path: PathResult | None, fact: str | None = None
 ) -> PlanningResult:
     """The result where nothing has to be done, or nothing can be."""
     return PlanningResult(
         scene=scene,
+        objective=goals,
         coarse=None,
         path=path,
         tree_size=1,

@@ -11,7 +11,7 @@ from guided_lgp.bounds.program.kernels import SCALE
 from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.bounds.program.slots import HeldBox
 from guided_lgp.bounds.results import Array
-from guided_lgp.bounds.terms import balanced, carried, hold, kernel_table, pads, stand
+from guided_lgp.bounds.terms import at, balanced, carried, hold, kernel_table, pads, stand, within
 from guided_lgp.poses import compose, pose, quaternion
 from guided_lgp.scene import Box, PlacedRobot, Scene, Table
 from guided_lgp.scene.footprints import footprint, gap
@@ -196,3 +196,40 @@ def test_clear_and_apart() -> None:
         assert np.mean(spheres[hulls]) > seen
         assert np.mean(spheres[~hulls]) < 0.05
         assert 0.1 < np.mean(hulls) < 0.9
+
+
+def test_at() -> None:
+    rng, verdicts = np.random.default_rng(5), []
+    goal = {"x": 0.5, "y": 0.2, "z": 0.65, "yaw": 3.0}
+    for _ in range(200):
+        x, y = rng.normal((0.5, 0.2), 0.01)
+        yaw = 3.0 + rng.normal(0.0, 0.08) + 2 * np.pi * rng.integers(-1, 2)
+        target = np.array([goal["x"], goal["y"], goal["yaw"], 0.02, 0.1])
+        rows = residual("at", np.array([x, y, yaw]), target)
+        placement = pose((x, y, 0.65), yaw).tolist()
+        top = Top(pose((0.54, 0.33, 0.6), 0.0).tolist(), (0.17, 0.2), 0.6)
+        excess = at.TERM.check(SIZE, placement, top, **goal, tolerance=0.02, turn=0.1)
+        assert (rows.min() >= 0) == (excess <= 0)
+        verdicts.append(excess <= 0)
+    both_verdicts(verdicts)
+
+
+def test_within() -> None:
+    rng, verdicts = np.random.default_rng(6), []
+    region = {"x0": -0.12, "y0": -0.1, "x1": 0.1, "y1": 0.15}
+    for _ in range(300):
+        support, local = (0.5, 0.1, rng.uniform(-3, 3)), rng.uniform(-0.1, 0.1, 2)
+        cosine, sine = np.cos(support[2]), np.sin(support[2])
+        x = support[0] + cosine * local[0] - sine * local[1]
+        y = support[1] + sine * local[0] + cosine * local[1]
+        yaw = support[2] + rng.choice([0.0, np.pi / 2]) + rng.normal(0.0, 0.2)
+        values = np.array([*support, x, y, yaw])
+        rows = residual("within", values, np.array([*region.values(), *np.array(SIZE[:2]) / 2]))
+        top = Top(pose((*support[:2], 0.6), support[2]).tolist(), (0.3, 0.3), 0.6)
+        excess = within.TERM.check(SIZE, pose((x, y, 0.65), yaw).tolist(), top, **region)
+        if rows.min() > 0:
+            assert excess < 0  # the kernel keeps a margin
+        if rows.min() < -0.004:
+            assert excess > 0
+        verdicts.append(excess <= 0)
+    both_verdicts(verdicts)

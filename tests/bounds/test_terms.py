@@ -31,7 +31,7 @@ def test_every_file_is_a_term() -> None:
 
 def test_an_unknown_term_is_refused_by_name() -> None:
     hand, box = load_domain().instructions[0].parameters
-    with pytest.raises(InputError, match=r"grasp: glue: is an unknown term .*apart, balanced"):
+    with pytest.raises(InputError, match=r"grasp: glue: is an unknown term .*apart, at, balanced"):
         check_terms(_with_contact(Term("hold", (hand, box)), Term("glue", (hand, box))))
 
 

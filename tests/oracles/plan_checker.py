@@ -49,6 +49,7 @@ AT_BOX = 0.005  # distance of a finger from the box that it holds
 AWAY = 0.005  # a tool this far from where it grasped or released has left the box
 OPENED = 0.01  # by which the fingers must be wider beside a box than on it, rad
 SAME_POSITION, SAME_ANGLE = 1e-3, 1e-2  # keyframes and path tell the same
+UPRIGHT = 0.05  # tilt (rad) up to which a box is upright on its way
 ROUNDING = 1e-3  # relative in velocities, absolute in joint positions
 
 Kind = (
@@ -138,18 +139,33 @@ def check(document: Mapping[str, Any]) -> list[Fault]:
         *_fingers(plan, events, motion),
         *_keyframes(plan, events, motion),
         *_collisions(plan, robot, events, motion),
-        *_goals(plan, events),
+        *_goals(plan, events, motion),
     ]
 
 
 # --- the file ------------------------------------------------------------------------------------
 
 
-def _atom(text: str, **arity: int) -> tuple[str, ...]:
-    found = re.fullmatch(r"\((\w+)((?: \S+)+)\)", text)
-    words = (found[1], *found[2].split()) if found else ()
-    if not words or arity.get(words[0]) != len(words) - 1:
-        raise ValueError(f"{text!r} is none of {', '.join(arity)}")
+GOALS = {
+    "held": (1,),
+    "on": (2,),
+    "heldby": (2,),
+    "empty": (1,),
+    "handempty": (0,),
+    "at": (6, 7, 8),  # box, table, x, y, z, yaw and, if not the usual ones, tolerances in m and rad
+    "in": (6,),  # box, table, two corners of a rectangle in the frame of its top
+    "upright": (1,),
+}
+ACTIONS = {"grasp": (2,), "place": (3,), "take": (3,)}
+NEAR, TURNED = 0.01, 0.05  # the usual tolerances of a goal's pose
+EDGE = 5e-4  # a corner may be outside a goal's region by this much
+
+
+def _atom(text: str, arities: Mapping[str, tuple[int, ...]]) -> tuple[str, ...]:
+    found = re.fullmatch(r"\((\w+)((?: \S+)*)\)", text)
+    words = (found[1], *found[2].split()) if found else ("",)
+    if len(words) - 1 not in arities.get(words[0], ()):
+        raise ValueError(f"{text!r} is none of {', '.join(arities)}")
     return words
 
 
@@ -166,8 +182,8 @@ def _read(document: Mapping[str, Any]) -> Plan:
         boxes={box["name"]: box for box in scene["boxes"]},
         tables={table["name"]: table for table in scene["tables"]},
         base=(x, y, float(placed.get("height", 0.0)), yaw),
-        goals=[_atom(goal, held=1, on=2) for goal in document["objective"]],
-        actions=[_atom(action, grasp=2, place=3, take=3) for action in document["actions"]],
+        goals=[_atom(goal, GOALS) for goal in document["objective"]],
+        actions=[_atom(action, ACTIONS) for action in document["actions"]],
         joints=list(document["joint_names"]),
         fixed={name: float(value) for name, value in document["fixed_joints"].items()},
         times=np.array(path["times"], float),
@@ -433,15 +449,57 @@ def _spans(attachment: Attachment, interval: int) -> bool:
     return attachment.start <= interval < attachment.end
 
 
-def _goals(plan: Plan, events: Sequence[Event]) -> Iterator[Fault]:
+def _goals(plan: Plan, events: Sequence[Event], motion: Motion) -> Iterator[Fault]:
     state = _start(plan)
     for event in events:
         state.apply(event.action)
     for goal in plan.goals:
-        kind, box, *table = goal
-        holds = box in state.holds.values() if kind == "held" else state.support.get(box) in table
-        if not holds:
+        if not _achieved(plan, state, motion, goal):
             yield Fault("goal", len(plan.times) - 1, f"{_text(goal)} does not hold at the end")
+
+
+def _achieved(plan: Plan, state: State, motion: Motion, goal: tuple[str, ...]) -> bool:
+    match goal:
+        case "held", box:
+            return box in state.holds.values()
+        case "on", box, table:
+            return state.support.get(box) == table
+        case "heldby", box, gripper:
+            return state.holds.get(gripper) == box
+        case "empty", gripper:
+            return gripper in plan.hands and gripper not in state.holds
+        case ("handempty",):
+            return not state.holds
+        case "at", box, table, *numbers:
+            there = _is_at(motion.boxes[box][-1], [float(number) for number in numbers])
+            return state.support.get(box) == table and there
+        case "in", box, table, *numbers:
+            inside = _is_in(plan, motion, box, table, [float(number) for number in numbers])
+            return state.support.get(box) == table and inside
+        case "upright", box:  # at rest it is level anyway, so that all of the way counts
+            return box in motion.boxes and _stays_level(plan, motion, box)
+    return False
+
+
+def _is_at(pose: np.ndarray, numbers: list[float]) -> bool:
+    x, y, z, yaw, near, turned = [*numbers, *(NEAR, TURNED)[len(numbers) - 4 :]]
+    turn = Rotation.from_matrix(pose[:3, :3]) * Rotation.from_euler("z", -yaw)
+    way = float(np.linalg.norm(pose[:3, 3] - (x, y, z)))
+    return way <= near + 1e-6 and turn.magnitude() <= turned + SAME_ANGLE
+
+
+def _is_in(plan: Plan, motion: Motion, box: str, table: str, region: list[float]) -> bool:
+    frame = motion.boxes[table][-1] if table in plan.boxes else _scene_pose(plan, table)
+    corners = _points(motion.boxes[box][-1:], _base(plan.boxes[box]["size"]))[0, :3].T
+    local = (corners - frame[:3, 3]) @ frame[:3, :3]
+    low, high = np.array(region[:2]) - EDGE, np.array(region[2:]) + EDGE
+    return bool(((local[:, :2] >= low) & (local[:, :2] <= high)).all())
+
+
+def _stays_level(plan: Plan, motion: Motion, box: str) -> bool:
+    corners = _points(motion.boxes[box], _base(plan.boxes[box]["size"]))
+    width = float(np.linalg.norm(plan.boxes[box]["size"][:2]))
+    return bool((np.ptp(corners[:, 2], axis=1) <= UPRIGHT * width).all())
 
 
 # --- the robot -----------------------------------------------------------------------------------

@@ -12,10 +12,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from guided_lgp.bounds.checks import Violation, box_sizes
+from guided_lgp.bounds.goals import GoalTerms
 from guided_lgp.bounds.results import Array, Trajectory
 from guided_lgp.bounds.verify.attachments import switches_of
 from guided_lgp.bounds.verify.geometry import grasp_faults
-from guided_lgp.logic import GroundAtom, Objective, Skeleton, State, successor
+from guided_lgp.logic import Goal, GroundAtom, Objective, Skeleton, State, successor
 from guided_lgp.poses import compose, inverse
 from guided_lgp.scene import Scene
 from guided_lgp.scene.bullet import pybullet
@@ -29,6 +30,8 @@ GRASP_SLACK = 0.006
 """How far (m, rad) beyond the limits of verification a simulated grasp may be off."""
 UPRIGHT = 0.9
 """Least vertical part of the contact normals where a box stands on something."""
+PLACE_SLACK = 0.005
+"""How far (m, rad) a box may be off the place that a goal asks for: as it settles."""
 HELD_SLACK = 0.02
 """How far (m) a held box may have slipped in the hand at the end."""
 _ARM_FORCE, _FINGER_FORCE, _FIXED_FORCE = 1000.0, 100.0, 1e5
@@ -86,6 +89,7 @@ def execute(
         run.rest()
         goals = {
             str(goal): all(run.holds(atom, state) for atom in state.domain.conditions(goal))
+            and run.in_place(goal)
             for goal in objective
         }
         drift = run.drift(planned)
@@ -212,6 +216,13 @@ class _Execution:
             case _:
                 return atom.holds_in(state)
         return seen != atom.negated
+
+    def in_place(self, goal: Goal) -> bool:
+        """Whether a box is where a goal wants it, but for what settling may shift."""
+        terms = GoalTerms.of((goal,), self._world.scene.symbols.domain)
+        boxes = {box: self._box(box) for box in self._world.boxes}
+        faults = terms.faults(self._world.scene, boxes)
+        return all(fault.amount <= PLACE_SLACK for fault in faults)
 
     def _in_hand(self, gripper: str, box: str) -> bool:
         """Whether a gripper holds a box that has not slipped."""

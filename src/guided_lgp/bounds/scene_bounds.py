@@ -7,9 +7,10 @@ from guided_lgp.bounds.coarse.facts import Facts
 from guided_lgp.bounds.coarse.pairs import Pairs
 from guided_lgp.bounds.coarse.parts import Boxes, Parts
 from guided_lgp.bounds.deadline import NEVER, Deadline
+from guided_lgp.bounds.goals import GoalTerms
 from guided_lgp.bounds.path import PathBound, check_motions
 from guided_lgp.bounds.results import CoarseResult, PathResult
-from guided_lgp.logic import Skeleton
+from guided_lgp.logic import Objective, Skeleton
 from guided_lgp.params import BoundsParams
 from guided_lgp.scene import Scene
 
@@ -22,15 +23,26 @@ class SceneBounds:
 
     The coarse bound of a skeleton starts from its prefix, and a skeleton with an infeasible prefix
     is infeasible: its constraints contain those of the prefix. So a verdict depends only on the
-    scene and the skeleton, whoever asks first, and planners may share one instance. After the
-    deadline there are no more verdicts, but an ``OutOfTimeError``.
+    scene, the objective and the skeleton, whoever asks first, and planners of one objective may
+    share one instance; goals of symbols alone change nothing. After the deadline there are no more
+    verdicts, but an ``OutOfTimeError``.
     """
 
-    def __init__(self, scene: Scene, params: BoundsParams, deadline: Deadline = NEVER) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        params: BoundsParams,
+        deadline: Deadline = NEVER,
+        objective: Objective = (),
+    ) -> None:
+        """Prepare a scene, for plans whose goals may say more than symbols."""
         check_terms(scene.symbols.domain)
         check_motions(scene.symbols.domain)
         self.scene = scene
-        self._coarse_bound = CoarseBound(scene, params.coarse_tries, deadline=deadline)
+        self._goals = GoalTerms.of(objective, scene.symbols.domain)
+        self._coarse_bound = CoarseBound(
+            scene, params.coarse_tries, deadline=deadline, goals=self._goals
+        )
         self._path_solutions = params.path_solutions
         self._deadline = deadline
         self._parts = Parts(scene, _PATIENCE * params.coarse_tries, self.facts, deadline)
@@ -74,7 +86,7 @@ class SceneBounds:
         """The verified motion for the whole skeleton, or why there is none."""
         result = self._path.get(skeleton)
         if result is None:
-            coarse = self.coarse(skeleton)
+            coarse = self._coarse_bound.finish(self.coarse(skeleton))
             if coarse.feasible:
                 result = self._path_bound.solve(coarse)
             else:
@@ -85,4 +97,6 @@ class SceneBounds:
     @cached_property
     def _path_bound(self) -> PathBound:
         """Built when first asked: most skeletons never get so far."""
-        return PathBound(self.scene, self._coarse_bound, self._path_solutions, self._deadline)
+        return PathBound(
+            self.scene, self._coarse_bound, self._path_solutions, self._deadline, self._goals
+        )

@@ -39,8 +39,10 @@ def plan(
         list[str],
         typer.Option(
             metavar="GOAL",
-            help='What must hold at the end: "(on BOX TABLE)", where TABLE may be another box, or '
-            '"(held BOX)". Once for each goal.',
+            help='What must hold at the end: "(on BOX TABLE)", where TABLE may be another box, '
+            '"(held BOX)", "(heldby BOX GRIPPER)", "(empty GRIPPER)", "(handempty)", "(at BOX X Y '
+            'Z YAW)", "(in BOX TABLE X0 Y0 X1 Y1)", a region of the top, or "(upright BOX)" on the '
+            "way. Once for each goal.",
         ),
     ],
     planner: Annotated[
@@ -170,6 +172,7 @@ def plan(
             domain=domain,
             where=str(scene),
         )
+    start, objective = result.scene, result.objective
     followed = SEARCHES[planner].follows_policy
     times = {name: round(value, 3) for name, value in asdict(result.times).items()}
     statistics = {
@@ -177,7 +180,7 @@ def plan(
         "policy": policy if followed else None,
         "weights": _origin(models, MODELS) if followed else None,
         "limits": _origin(params, PLANNING),
-        "domain": result.scene.domain,
+        "domain": start.domain,
         "tree_size": result.tree_size,
         "attempts": 1 + sum(result.reattempts.values()),
         "coarse_sequences": result.coarse_calls,
@@ -212,17 +215,17 @@ def plan(
         from guided_lgp.bounds.execution import execute as simulate
 
         with spinner("executing"):
-            physics = asdict(simulate(result.scene, objective, path.skeleton, path.trajectory))
+            physics = asdict(simulate(start, objective, path.skeleton, path.trajectory))
         summary["physics"] = physics
     if plan_file := files["--out"]:
         from guided_lgp.bounds.plan_file import write_plan
 
-        write_plan(plan_file, result.scene, objective, path, statistics, physics)
+        write_plan(plan_file, start, objective, path, statistics, physics)
     if page := files["--html"]:
         from guided_lgp.view.replay import replay_html
 
         with spinner("writing the replay"):
-            replay_html(path.trajectory, result.scene, page, path.skeleton, objective)
+            replay_html(path.trajectory, start, page, path.skeleton, objective)
     if as_json:
         typer.echo(json.dumps(summary, indent=1))
         return

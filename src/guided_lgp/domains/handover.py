@@ -32,5 +32,6 @@ DOMAIN = Domain(
     types=PICK_AND_PLACE.types,
     instructions=(*PICK_AND_PLACE.instructions, take),
     goal_types=PICK_AND_PLACE.goal_types,
+    further_goals=PICK_AND_PLACE.further_goals,
     extends=PICK_AND_PLACE,
 )

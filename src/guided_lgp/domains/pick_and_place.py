@@ -13,6 +13,8 @@ from guided_lgp.logic.declarations import (
     free,
     held,
     holds,
+    idle,
+    numbers,
     on,
     terms,
 )
@@ -24,6 +26,7 @@ g, b, t = Gripper("gripper"), Box("box"), Table("table")
 
 pads, hold, beside = terms("pads hold beside")
 stand, balanced, present = terms("stand balanced present")
+at, within, upright = terms("at within upright")
 transit, line_in, switch, line_out, home = terms("transit line_in switch line_out home")
 
 grasp = Instruction(
@@ -62,4 +65,19 @@ DOMAIN = Domain(
     types=(Gripper, Table, Box),
     instructions=(grasp, place),
     goal_types=(GoalType("held", (b,), (held(b),)), GoalType("on", (b, t), (on(b, t),))),
+    further_goals=(
+        GoalType("heldby", (b, g), (holds(g, b),)),
+        GoalType("empty", (g,), (free(g),)),
+        GoalType("handempty", (), (idle(),)),
+        GoalType(
+            "at",
+            (b, t),
+            (on(b, t),),
+            numbers=numbers("x y z yaw", tolerance=0.01, turn=0.05),
+            final=(at(b, t),),
+            derived=t,
+        ),
+        GoalType("in", (b, t), (on(b, t),), numbers=numbers("x0 y0 x1 y1"), final=(within(b, t),)),
+        GoalType("upright", (b,), lasting=(upright(b),)),
+    ),
 )

@@ -91,6 +91,11 @@ def same(one: Variable, other: Variable) -> Atom:
     return Atom("same", (one, other))
 
 
+def idle() -> Atom:
+    """No gripper holds anything."""
+    return Atom("idle", ())
+
+
 @dataclass(frozen=True)
 class FactType:
     """A predicate that the mode tree does not tell: ``opened = FactType("open", (d,))``.
@@ -165,9 +170,32 @@ class Instruction:
 
 
 @dataclass(frozen=True)
+class Number:
+    """A number that a goal gives; one with a default may be left out, after all others."""
+
+    name: str
+    default: float | None = None
+
+
+def numbers(names: str, **defaults: float) -> tuple[Number, ...]:
+    """Numbers of a goal: ``numbers("x y", tolerance=0.01)``."""
+    optional = (Number(name, default) for name, default in defaults.items())
+    return (*map(Number, names.split()), *optional)
+
+
+@dataclass(frozen=True)
 class GoalType:
-    """A kind of goal: what must be true of its parameters."""
+    """A kind of goal: what must be true of its parameters, and where it leaves a body.
+
+    Numbers follow the parameters in a goal's text. ``final`` are the terms that hold at the end of
+    a plan, ``lasting`` those that hold all the time; a term has the numbers as options.
+    """
 
     name: str
     parameters: tuple[Variable, ...]
-    condition: tuple[Atom, ...]
+    condition: tuple[Atom, ...] = ()
+    numbers: tuple[Number, ...] = ()
+    final: tuple[Term, ...] = ()
+    lasting: tuple[Term, ...] = ()
+    derived: Variable | None = None
+    """The parameter that a text may leave out: what is below the pose that the numbers give."""

@@ -1,5 +1,6 @@
 """A domain, and what a ground action is by its declaration."""
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
@@ -70,6 +71,9 @@ class Domain:
     types: tuple[Type, ...]
     instructions: tuple[Instruction, ...]
     goal_types: tuple[GoalType, ...]
+    """Those from which objectives are drawn, and which policies encode."""
+    further_goals: tuple[GoalType, ...] = ()
+    """Others that users may ask for."""
     facts: tuple[FactType, ...] = ()
     extends: "Domain | None" = None
     """The domain to which this one adds instructions, for goals that need them."""
@@ -148,20 +152,48 @@ class Domain:
         Raises:
             InputError: the domain has no such goal type, or it takes other symbols.
         """
-        for known in self.goal_types:
+        every = (*self.goal_types, *self.further_goals)
+        for known in every:
             if known.name == goal.kind and _fits(known, goal.symbols):
                 return known
-        raise InputError(f"goal {str(goal)!r}", "is not a goal", signatures(self.goal_types))
+        raise InputError(f"goal {str(goal)!r}", "is not a goal", signatures(every))
+
+    def final_terms(self, goal: Goal) -> tuple[GroundTerm, ...]:
+        """The terms that a goal adds to the end of a plan.
+
+        Raises:
+            InputError: as for ``goal_type``, or a number cannot be read.
+        """
+        return _goal_terms(self, goal, self.goal_type(goal).final)
+
+    def lasting_terms(self, goal: Goal) -> tuple[GroundTerm, ...]:
+        """The terms that a goal adds to every moment; see ``final_terms``."""
+        return _goal_terms(self, goal, self.goal_type(goal).lasting)
 
 
 def signatures(declared: Iterable[Instruction | GoalType]) -> str:
     """How actions or goals are written: ``(grasp gripper box), (place gripper box table)``."""
-    words = ((one.name, *(variable.name for variable in one.parameters)) for one in declared)
-    return ", ".join(f"({' '.join(names)})" for names in words)
+    return ", ".join(map(_signature, declared))
+
+
+def _signature(declared: Instruction | GoalType) -> str:
+    words = [variable.name for variable in declared.parameters]
+    if isinstance(declared, GoalType):
+        words = [f"[{word}]" if _is_derived(declared, word) else word for word in words]
+        words += [n.name if n.default is None else f"[{n.name}]" for n in declared.numbers]
+    return f"({' '.join((declared.name, *words))})"
+
+
+def _is_derived(declared: GoalType, name: str) -> bool:
+    return declared.derived is not None and declared.derived.name == name
 
 
 def _fits(declared: Instruction | GoalType, symbols: tuple[str, ...]) -> bool:
-    return len(declared.parameters) == len(symbols)
+    beyond = len(symbols) - len(declared.parameters)
+    if isinstance(declared, Instruction):
+        return beyond == 0
+    required = sum(number.default is None for number in declared.numbers)
+    return required <= beyond <= len(declared.numbers)
 
 
 @cache
@@ -185,8 +217,30 @@ def _bind(domain: Domain, action: Action) -> GroundInstruction:
 @cache
 def _conditions(domain: Domain, goal: Goal) -> tuple[GroundAtom, ...]:
     goal_type = domain.goal_type(goal)
-    value = dict(zip(goal_type.parameters, goal.symbols, strict=True))
+    value = dict(zip(goal_type.parameters, goal.symbols, strict=False))
     return tuple(_ground_atom(atom, value) for atom in goal_type.condition)
+
+
+@cache
+def _goal_terms(domain: Domain, goal: Goal, terms: tuple[Term, ...]) -> tuple[GroundTerm, ...]:
+    goal_type = domain.goal_type(goal)
+    value = dict(zip(goal_type.parameters, goal.symbols, strict=False))
+    options = _numbers(goal, goal_type)
+    ground = (_ground_term(term, value) for term in terms)
+    return tuple(GroundTerm(one.name, one.symbols, {**one.options, **options}) for one in ground)
+
+
+def _numbers(goal: Goal, goal_type: GoalType) -> dict[str, float]:
+    given = goal.symbols[len(goal_type.parameters) :]
+    values = {number.name: number.default for number in goal_type.numbers}
+    for name, text in zip(values, given, strict=False):
+        try:
+            values[name] = float(text)
+        except ValueError:
+            values[name] = math.nan
+        if not math.isfinite(values[name] or 0.0):
+            raise InputError(f"goal {goal}", f"{name} is {text!r}", "a number in m or rad")
+    return {name: value for name, value in values.items() if value is not None}
 
 
 def _ground_atom(atom: Atom, value: Mapping[Variable, str]) -> GroundAtom:

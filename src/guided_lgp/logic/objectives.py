@@ -1,7 +1,7 @@
 """Objectives: sets of goals, their enumeration, their lower bounds, and their validation."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import lru_cache
 from itertools import combinations
 
@@ -30,7 +30,8 @@ def least_actions(state: State, objective: Objective, symbols: Symbols) -> float
     """A lower bound on the number of actions to an objective.
 
     For every body that the goals speak of, the fewest changes of its parent until they hold, all
-    else left out of account. No action moves two bodies, so that these numbers add up.
+    else left out of account, and one for every other body in a hand that shall be empty. No action
+    moves two bodies, so that these numbers add up.
 
     Returns:
         Infinity if a body can never get where it should be.
@@ -38,10 +39,12 @@ def least_actions(state: State, objective: Objective, symbols: Symbols) -> float
     if satisfied(state, objective):
         return 0
     wanted = _wanted_parents(objective, symbols)
-    changes = (
+    changes = [
         _changes_of_parent(symbols, body, parents).get(state.parent_of(body), math.inf)
         for body, parents in wanted.items()
-    )
+    ]
+    emptied = _emptied(objective, symbols)
+    changes += [1 for body, gripper in state.held if gripper in emptied and body not in wanted]
     return max(1, sum(changes))
 
 
@@ -53,6 +56,54 @@ def _wanted_parents(objective: Objective, symbols: Symbols) -> Mapping[str, froz
         for body, parents in parents_wanted_by(goal, symbols).items():
             wanted[body] = wanted.get(body, parents) & parents
     return wanted
+
+
+@lru_cache(maxsize=4096)
+def _emptied(objective: Objective, symbols: Symbols) -> frozenset[str]:
+    """The grippers that shall hold nothing."""
+    emptied: set[str] = set()
+    for goal in objective:
+        for predicate, names, negated in symbols.domain.conditions(goal):
+            if predicate in ("free", "idle") and not negated:
+                emptied.update(names or symbols.grippers)
+    return frozenset(emptied)
+
+
+@lru_cache(maxsize=4096)
+def encodable(objective: Objective, symbols: Symbols) -> Objective:
+    """What an objective asks for in the goal types that policies encode.
+
+    Of a further goal this is what its conditions imply: ``(heldby red pr2L)`` asks for
+    ``(held red)``.
+    """
+    drawn = {goal_type.name for goal_type in symbols.domain.goal_types}
+    found: list[Goal] = []
+    for goal in objective:
+        found += [goal] if goal.kind in drawn else _implied(goal, symbols)
+    return tuple(dict.fromkeys(found))
+
+
+def _implied(goal: Goal, symbols: Symbols) -> Iterator[Goal]:
+    """The goals of one atom each, of the domain's goal types, that hold wherever a goal does."""
+    atoms = list(symbols.domain.conditions(goal))
+    atoms += [
+        GroundAtom("held", atom.symbols[1:], False)
+        for atom in atoms
+        if (atom.predicate, atom.negated) == ("holds", False)
+    ]
+    for goal_type in symbols.domain.goal_types:
+        if len(goal_type.condition) != 1:
+            continue
+        (condition,) = goal_type.condition
+        for atom in atoms:
+            if atom[::2] == (condition.predicate, condition.negated):
+                value = dict(zip(condition.arguments, atom.symbols, strict=True))
+                yield Goal(goal_type.name, tuple(value[v] for v in goal_type.parameters))
+
+
+def asks_for_places(objective: Objective, symbols: Symbols) -> bool:
+    """Whether it takes more than a state to tell whether an objective holds."""
+    return any(symbols.domain.final_terms(goal) for goal in objective)
 
 
 def parents_wanted_by(goal: Goal, symbols: Symbols) -> Mapping[str, frozenset[str]]:
@@ -154,10 +205,21 @@ def validate_objective(objective: Objective, symbols: Symbols, state: State) -> 
     """Check an objective before any search.
 
     Raises:
-        InputError: unknown goal or symbol, contradictory goals, more to hold than grippers, or
-            nothing left to do.
+        InputError: see :func:`check_objective`; or nothing is left to do.
     """
-    goal_types = symbols.domain.goal_types
+    check_objective(objective, symbols)
+    if satisfied(state, objective) and not asks_for_places(objective, symbols):
+        raise InputError("objective", f"{format_objective(objective)} already holds in the scene")
+
+
+def check_objective(objective: Objective, symbols: Symbols) -> None:
+    """Check that an objective can hold at all.
+
+    Raises:
+        InputError: unknown goal or symbol, contradictory goals, or more to hold than grippers.
+    """
+    domain = symbols.domain
+    goal_types = (*domain.goal_types, *domain.further_goals)
     if not objective:
         raise InputError("goal", "none given", f"one or more of {signatures(goal_types)}")
     for goal in objective:
@@ -166,13 +228,11 @@ def validate_objective(objective: Objective, symbols: Symbols, state: State) -> 
     if fault is not None:
         raise InputError("objective", fault)
     _check_hands(objective, symbols)
-    if satisfied(state, objective):
-        raise InputError("objective", f"{format_objective(objective)} already holds in the scene")
 
 
 def _check_symbols(goal: Goal, symbols: Symbols) -> None:
     parameters = symbols.domain.goal_type(goal).parameters
-    for variable, name in zip(parameters, goal.symbols, strict=True):
+    for variable, name in zip(parameters, goal.symbols, strict=False):
         kind = variable.type.name
         if not symbols.is_a(name, kind):
             accepted = ", ".join(symbols.of(kind))
@@ -181,9 +241,7 @@ def _check_symbols(goal: Goal, symbols: Symbols) -> None:
 
 def _check_hands(objective: Objective, symbols: Symbols) -> None:
     """A gripper holds one thing; goals may ask for a certain one, or for an empty one."""
-    atoms = [atom for goal in objective for atom in symbols.domain.conditions(goal)]
-    empty = {name for atom in atoms if atom[::2] == ("free", False) for name in atom.symbols}
-    hands = frozenset(symbols.grippers) - empty
+    hands = frozenset(symbols.grippers) - _emptied(objective, symbols)
     wanted = _wanted_parents(objective, symbols).values()
     held = [parents & hands for parents in wanted if parents <= frozenset(symbols.grippers)]
     if len(held) > len(hands):

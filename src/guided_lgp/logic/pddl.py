@@ -19,7 +19,7 @@ from guided_lgp.logic.symbols import Symbols
 _HEAD = """(define (domain {name})
  (:requirements :adl :derived-predicates)
  (:predicates
-  (parent ?x ?y) (holds ?g ?x) (held ?x) (free ?g) (on ?x ?y) (clear ?x) (carries ?x ?y)
+  (parent ?x ?y) (holds ?g ?x) (held ?x) (free ?g) (on ?x ?y) (clear ?x) (carries ?x ?y) (idle)
   {own})
  (:derived (holds ?g ?x) (and (is-gripper ?g) (parent ?x ?g)))
  (:derived (held ?x) (exists (?g) (holds ?g ?x)))
@@ -27,6 +27,7 @@ _HEAD = """(define (domain {name})
  (:derived (on ?x ?y) (and (parent ?x ?y) (not (is-gripper ?y))))
  (:derived (clear ?y) (not (exists (?x) (parent ?x ?y))))
  (:derived (carries ?x ?y) (or (= ?x ?y) (exists (?z) (and (on ?z ?x) (carries ?z ?y)))))
+ (:derived (idle) (not (exists (?g ?x) (holds ?g ?x))))
 """
 
 

@@ -88,5 +88,6 @@ _PREDICATES: Mapping[str, Callable[..., bool]] = {
     "clear": lambda state, support: not state.children_of(support),
     "carries": lambda state, body, other: other == body or other in state.carried_by(body),
     "same": lambda state, one, other: one == other,
+    "idle": lambda state: not state.held,
 }
 """What the mode tree says; every other predicate is a fact of the domain."""

@@ -57,14 +57,16 @@ def facts(state: State, symbols: Symbols) -> frozenset[Fact]:
 
 def goal_facts(objective: Objective, symbols: Symbols) -> frozenset[Fact]:
     """The facts that an objective asks for."""
-    conditions = (atom for goal in objective for atom in symbols.domain.conditions(goal))
+    conditions = [atom for goal in objective for atom in symbols.domain.conditions(goal)]
+    if GroundAtom("idle", (), False) in conditions:
+        conditions += [GroundAtom("free", (gripper,), False) for gripper in symbols.grippers]
     return frozenset(_strips_facts(conditions))
 
 
 def _strips_facts(atoms: Iterable[GroundAtom]) -> Iterator[Fact]:
     """Atoms as facts, as far as there are such facts."""
     for predicate, names, negated in atoms:
-        if predicate in ("same", "carries"):
+        if predicate in ("same", "carries", "idle"):
             continue
         if predicate == "held":
             yield ("standing" if negated else "held", *names)
@@ -120,6 +122,7 @@ def _domain_facts(symbols: Symbols) -> Iterator[Fact]:
 def _used(domain: Domain) -> frozenset[str]:
     """The predicates of the facts that conditions ask for."""
     asked = [atom for one in domain.instructions for atom in one.precondition]
-    asked += [atom for one in domain.goal_types for atom in one.condition]
+    goal_types = (*domain.goal_types, *domain.further_goals)
+    asked += [atom for one in goal_types for atom in one.condition]
     atoms = (GroundAtom(atom.predicate, ("",), atom.negated) for atom in asked)
     return frozenset(predicate for predicate, _ in _strips_facts(atoms))

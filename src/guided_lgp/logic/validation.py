@@ -4,7 +4,15 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from guided_lgp.errors import InputError
-from guided_lgp.logic.declarations import Atom, Attach, GoalType, Instruction, Type, Variable
+from guided_lgp.logic.declarations import (
+    Atom,
+    Attach,
+    GoalType,
+    Instruction,
+    Term,
+    Type,
+    Variable,
+)
 from guided_lgp.logic.symbols import GRIPPER
 
 if TYPE_CHECKING:
@@ -19,6 +27,7 @@ PREDICATES = {
     "clear": (_ANY,),
     "carries": (_MOVABLE, _ANY),
     "same": (_ANY, _ANY),
+    "idle": (),
 }
 """The predicates of every domain, with what their arguments have to be."""
 
@@ -40,7 +49,7 @@ def check_declarations(domain: "Domain") -> None:
     for field, declared in (
         ("types", domain.types),
         ("instructions", domain.instructions),
-        ("goal_types", domain.goal_types),
+        ("goal_types", (*domain.goal_types, *domain.further_goals)),
         ("facts", domain.facts),
     ):
         _check_names(field, [one.name for one in declared], refuse)
@@ -50,18 +59,14 @@ def check_declarations(domain: "Domain") -> None:
             raise refuse(f"fact {fact.name}", "is a predicate of every domain", "another name")
     for instruction in domain.instructions:
         _check_instruction(instruction, domain, refuse)
-    for goal_type in domain.goal_types:
-        field = f"goal type {goal_type.name}"
-        _check_parameters(field, goal_type.parameters, domain, refuse)
-        _check_atoms(f"{field}, condition", goal_type.condition, goal_type, domain, refuse)
-        if not goal_type.condition:
-            raise refuse(f"{field}, condition", "is empty", "one or more atoms")
+    for goal_type in (*domain.goal_types, *domain.further_goals):
+        _check_goal_type(goal_type, domain, refuse)
     if domain.extends is not None:
         _check_names_kept(domain, domain.extends, refuse)
 
 
 def _check_names_kept(domain: "Domain", base: "Domain", refuse: Refuse) -> None:
-    for field in ("types", "instructions", "goal_types", "facts"):
+    for field in ("types", "instructions", "goal_types", "further_goals", "facts"):
         for one in getattr(base, field):
             if one not in getattr(domain, field):
                 raise refuse("extends", f"{one.name} of {base.name} is missing", f"all its {field}")
@@ -109,11 +114,28 @@ def _check_instruction(one: Instruction, domain: "Domain", refuse: Refuse) -> No
         raise refuse(f"{field}, precondition", f"does not say what {name} holds", accepted)
     _check_effect(f"{field}, effect", one, domain, refuse)
     for part, terms in (("contact", one.contact), ("motion", one.motion)):
-        for term in terms:
-            options = [value for value in term.options.values() if isinstance(value, Variable)]
-            _check_arguments(
-                f"{field}, {part}, {term.name}", (*term.arguments, *options), one, refuse
-            )
+        _check_terms(f"{field}, {part}", terms, one, refuse)
+
+
+def _check_terms(
+    field: str, terms: Iterable[Term], owner: Instruction | GoalType, refuse: Refuse
+) -> None:
+    for term in terms:
+        options = [value for value in term.options.values() if isinstance(value, Variable)]
+        _check_arguments(f"{field}, {term.name}", (*term.arguments, *options), owner, refuse)
+
+
+def _check_goal_type(one: GoalType, domain: "Domain", refuse: Refuse) -> None:
+    field = f"goal type {one.name}"
+    _check_parameters(field, one.parameters, domain, refuse)
+    _check_names(f"{field}, numbers", [number.name for number in one.numbers], refuse)
+    _check_atoms(f"{field}, condition", one.condition, one, domain, refuse)
+    _check_terms(f"{field}, final", one.final, one, refuse)
+    _check_terms(f"{field}, lasting", one.lasting, one, refuse)
+    if not (one.condition or one.final or one.lasting):
+        raise refuse(f"{field}, condition", "is empty", "one or more atoms")
+    if one.derived is not None:
+        _check_arguments(f"{field}, derived", [one.derived], one, refuse)
 
 
 def _tells_of(atom: Atom, gripper: Variable) -> bool:

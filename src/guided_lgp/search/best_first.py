@@ -87,10 +87,10 @@ def search(
         if configuration is None:
             knowledge.learn(tree.run.failed)
             continue
-        if tree.satisfied(node):
-            if tree.run.solve(node.skeleton):
-                return tree.result()
-        elif len(node.skeleton) < max_depth:
+        satisfied = tree.satisfied(node)
+        if satisfied and tree.run.solve(node.skeleton):
+            return tree.result()
+        if tree.goes_on(satisfied) and len(node.skeleton) < max_depth:
             estimate.expanded(node)
             for child in tree.expand(node, configuration):
                 if estimate.least_length(child) <= max_depth:

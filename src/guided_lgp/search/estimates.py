@@ -34,6 +34,9 @@ NEEDED = 3.0
 Hand-made, like the count of the actions: with 1, other ways to as good a state come first.
 """
 
+_MOVE = 2
+"""Actions that it takes to move a body which no symbol tells to be misplaced."""
+
 
 class Estimate(Protocol):
     """What a best-first search expects of a node."""
@@ -59,6 +62,7 @@ class PolicyEstimate(Estimate):
     """
 
     def __init__(self, problem: Problem) -> None:
+        self._problem = problem
         self._objective, self._symbols = problem.objective, problem.symbols
         self._visits: Counter[State] = Counter()
 
@@ -66,6 +70,7 @@ class PolicyEstimate(Estimate):
         """See :class:`Estimate`."""
         depth = len(node.skeleton)
         length = depth + self._needed(node)
+        length += _MOVE * len(self._problem.unsettled(node.skeleton))
         cost = -node.discrepancy + DETOUR * length + REVISIT * self._visits[node.state]
         return cost, -depth
 

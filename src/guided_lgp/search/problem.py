@@ -1,10 +1,10 @@
 """What a planner is given."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from guided_lgp.bounds.deadline import NEVER, Deadline
-from guided_lgp.logic import Objective, Symbols, validate_objective
+from guided_lgp.logic import Objective, Skeleton, Symbols, successor, validate_objective
 from guided_lgp.params import SearchLimits
 from guided_lgp.scene import Scene
 from guided_lgp.search.bounds import Bounds, NoParts, Parts
@@ -32,6 +32,9 @@ class Problem:
     parts: Parts = field(default_factory=NoParts)
     """For the searches that make use of it."""
 
+    misplaced: Mapping[str, frozenset[str]] = field(default_factory=dict)
+    """Bodies that every plan moves, whatever the symbols say, since the goals ask for places; for
+    each, the bodies that stand there at the start."""
     deadline: Deadline = NEVER
     """When the search ends, for users."""
     widened: Callable[[], "Problem | None"] = lambda: None
@@ -39,6 +42,27 @@ class Problem:
 
     def __post_init__(self) -> None:
         validate_objective(self.objective, self.symbols, self.scene.state)
+
+    def moved(self, skeleton: Skeleton) -> frozenset[str]:
+        """The bodies that a sequence moves."""
+        state, moved = self.scene.state, set[str]()
+        for action in skeleton:
+            body = self.symbols.domain.bind(action).body
+            moved |= {body, *state.carried_by(body)}
+            state = successor(state, action)
+        return frozenset(moved)
+
+    def unsettled(self, skeleton: Skeleton) -> frozenset[str]:
+        """The bodies that are still to move: misplaced ones after those that stand there."""
+        if not self.misplaced:
+            return frozenset()
+        last = {self.symbols.domain.bind(a).body: k for k, a in enumerate(skeleton)}
+        found = set[str]()
+        for body, others in self.misplaced.items():
+            found |= others - self.moved(skeleton)
+            if body not in last or others - self.moved(skeleton[: last[body]]):
+                found.add(body)
+        return frozenset(found)
 
     @property
     def symbols(self) -> Symbols:

@@ -125,6 +125,7 @@ class Run:
     """One run of a planner: the bounds and the policy as it sees them, with their cost."""
 
     def __init__(self, problem: Problem) -> None:
+        self._problem = problem
         self._bounds = problem.bounds
         self._part = problem.parts.part
         self._limits = problem.limits
@@ -183,6 +184,8 @@ class Run:
 
     def solve(self, skeleton: Skeleton) -> bool:
         """Coarse, then path bound of a sequence that satisfies the objective."""
+        if not self._problem.misplaced.keys() <= self._problem.moved(skeleton):
+            return False
         coarse = self.coarse(skeleton)
         if not coarse.feasible:
             return False

@@ -14,6 +14,7 @@ from guided_lgp.logic import (
     successor,
     unsatisfied,
 )
+from guided_lgp.logic.objectives import asks_for_places, encodable
 from guided_lgp.search.observation import observe, shapes, start
 from guided_lgp.search.policy import SeeingPolicy
 from guided_lgp.search.problem import Problem
@@ -50,6 +51,13 @@ class SkeletonTree:
     def satisfied(self, node: Node) -> bool:
         """Whether the goals hold at a node."""
         return satisfied(node.state, self.problem.objective)
+
+    def goes_on(self, satisfied: bool) -> bool:
+        """Whether what begins with a node may be a plan, when the node is none.
+
+        Where the goals hold, only if they ask for places: another sequence may end elsewhere.
+        """
+        return not satisfied or asks_for_places(self.problem.objective, self.problem.symbols)
 
     def configuration(self, node: Node) -> Keyframe | None:
         """x_k = P_coarse(a_1:k)|_k (paper, eq. 3), the arm retreated; None if infeasible."""
@@ -91,6 +99,9 @@ class SkeletonTree:
         if isinstance(policy, SeeingPolicy):
             policy = policy.given(shapes(problem.scene, configuration))
         goals = unsatisfied(node.state, problem.objective) if problem.adapt else problem.objective
+        goals = encodable(goals, problem.symbols)
+        if not goals:
+            return [0.0] * len(actions)
         positions = observe(problem.scene, configuration)
         scores: list[float] = self.run.log_probabilities(
             policy, goals, node.state, problem.scene.symbols, positions, actions

@@ -13,6 +13,7 @@ from guided_lgp.bounds.coarse.formulation import Formulation, Formulator
 from guided_lgp.bounds.coarse.solver import Settings, Solution, Solver, default_solver
 from guided_lgp.bounds.coarse.starts import Starts
 from guided_lgp.bounds.deadline import NEVER, Deadline
+from guided_lgp.bounds.goals import NO_TERMS, GoalTerms
 from guided_lgp.bounds.program.geometry import Margins, SceneGeometry
 from guided_lgp.bounds.results import Array, CoarseResult, Failure
 from guided_lgp.bounds.terms.term import UngraspableError
@@ -45,6 +46,7 @@ class CoarseBound:
         deadline: Deadline = NEVER,
         facts: Facts | None = None,
         world: World | None = None,
+        goals: GoalTerms = NO_TERMS,
     ) -> None:
         """Prepare a scene.
 
@@ -55,10 +57,13 @@ class CoarseBound:
             deadline: when to give up in any case.
             facts: of this scene or one with more boxes, if there are some already.
             world: of this scene, if there is one already.
+            goals: terms of which those of every moment always hold, and those of the end in
+                ``finish`` and ``solutions``.
         """
         self.scene = scene
         self._restarts = restarts
         self._deadline = deadline
+        self._goals = goals
         self._solver = solver or default_solver(scene.robot.description)
         self._geometry = SceneGeometry(scene)
         self.facts = facts or Facts(self._geometry)
@@ -91,9 +96,18 @@ class CoarseBound:
         elapsed = time.perf_counter() - started
         return CoarseSolution(**(vars(result) | {"time_s": elapsed}))
 
+    def finish(self, result: CoarseResult) -> CoarseResult:
+        """The verdict on a skeleton at whose end the terms of the goals hold, from one without."""
+        if not result.feasible or not self._goals.final:
+            return result
+        started = time.perf_counter()
+        programs = _Programs(self._geometry, result.skeleton, self._goals)
+        found = self._first_feasible(programs, None)
+        return replace(found, time_s=time.perf_counter() - started)
+
     def solutions(self, skeleton: Skeleton, count: int) -> Iterator[CoarseResult]:
-        """Up to ``count`` further verified solutions from independent starts."""
-        programs = _Programs(self._geometry, skeleton)
+        """Up to ``count`` further verified solutions, with the goals, from independent starts."""
+        programs = _Programs(self._geometry, skeleton, self._goals)
         found = 0
         for number in range(self._restarts, self._restarts + 3 * count):
             try:
@@ -107,13 +121,19 @@ class CoarseBound:
                 return
 
     def _search(self, skeleton: Skeleton, prefix: CoarseSolution | None) -> CoarseSolution:
+        """The verdict on a skeleton, whose prefix is feasible, without the goals' places."""
+        early = replace(self._goals, final=())
+        return self._first_feasible(_Programs(self._geometry, skeleton, early), prefix)
+
+    def _first_feasible(
+        self, programs: "_Programs", prefix: CoarseSolution | None
+    ) -> CoarseSolution:
         """Start after start until one leads to a verified solution, unless a fact forbids it.
 
         A fact that has to be proved first is worth its time when the first start has failed.
         """
+        skeleton, failures = programs.skeleton, list[Failure]()
         fact = self.facts.known(skeleton)
-        programs = _Programs(self._geometry, skeleton)
-        failures: list[Failure] = []
         for number in range(self._restarts):
             if number == 1:
                 fact = self.facts.impossible(skeleton)
@@ -152,17 +172,18 @@ class CoarseBound:
             solution.values[: len(warm_start)], warm_start
         )
         verified = len(programs.skeleton) - 1 if kept else 0
-        return self._check(programs.skeleton, formulation, solution, number + 1, verified)
+        return self._check(programs, formulation, solution, number + 1, verified)
 
     def _check(
         self,
-        skeleton: Skeleton,
+        programs: "_Programs",
         formulation: Formulation,
         solution: Solution,
         restarts: int,
         verified: int,
     ) -> CoarseSolution:
         """Decode a solution and verify it, from the first action on that is not verified yet."""
+        skeleton = programs.skeleton
         if not solution.converged(self._settings):
             failure = self._decoder.failure(formulation, solution, self._settings.slack)
             return CoarseSolution(skeleton, feasible=False, failure=failure, restarts=restarts)
@@ -171,6 +192,9 @@ class CoarseBound:
             formulation, formulation.after_action, solution.values
         )
         found = verify_keyframes(self._world, skeleton, at_switch, after_action, verified)
+        if found is None:
+            missed = programs.goals.faults(self.scene, after_action[-1].boxes)
+            found = replace(missed[0], action=len(skeleton) - 1) if missed else None
         if found is not None:
             failure = Failure(found.action, found.constraint, found.amount, "verification")
             return CoarseSolution(skeleton, feasible=False, failure=failure, restarts=restarts)
@@ -195,8 +219,9 @@ _MARGINS = (
 class _Programs:
     """The programs of a skeleton, one per set of margins, built when a start needs them."""
 
-    def __init__(self, geometry: SceneGeometry, skeleton: Skeleton) -> None:
+    def __init__(self, geometry: SceneGeometry, skeleton: Skeleton, goals: GoalTerms) -> None:
         self.skeleton = skeleton
+        self.goals = goals
         self._geometry = geometry
         self._built: dict[int, Formulation] = {}
 
@@ -204,7 +229,9 @@ class _Programs:
         """The program that a start solves."""
         index = number % len(_MARGINS)
         if index not in self._built:
-            self._built[index] = Formulator(self._geometry, _MARGINS[index]).build(self.skeleton)
+            terms = self.goals.lasting, self.goals.final
+            formulator = Formulator(self._geometry, _MARGINS[index], *terms)
+            self._built[index] = formulator.build(self.skeleton)
         return self._built[index]
 
 

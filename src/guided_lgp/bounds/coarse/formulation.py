@@ -7,14 +7,14 @@ every stack is balanced. An arm stands at its side, except while the box that it
 others.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from inspect import signature
 
 import numpy as np
 
 from guided_lgp.bounds.program.arrays import Instance, Program
-from guided_lgp.bounds.program.context import Context, Line, Start
+from guided_lgp.bounds.program.context import Aim, Context, Line, Start
 from guided_lgp.bounds.program.geometry import Margins, SceneGeometry
 from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.bounds.program.slots import ArmConfiguration, HeldBox, KeyframeSlots
@@ -22,8 +22,10 @@ from guided_lgp.bounds.results import Array
 from guided_lgp.bounds.terms import find_term, kernel_table, term_names
 from guided_lgp.bounds.terms.apart import keep_apart
 from guided_lgp.bounds.terms.clear import keep_clear
+from guided_lgp.bounds.terms.term import GoalTerm
 from guided_lgp.errors import InputError
 from guided_lgp.logic import Domain, GroundInstruction, GroundTerm, Skeleton, successor
+from guided_lgp.logic.declarations import Number, Term
 
 
 @dataclass(frozen=True)
@@ -43,10 +45,27 @@ class Formulation:
 class Formulator:
     """Builds the program of one skeleton."""
 
-    def __init__(self, geometry: SceneGeometry, margins: Margins) -> None:
+    def __init__(
+        self,
+        geometry: SceneGeometry,
+        margins: Margins,
+        lasting: Iterable[GroundTerm] = (),
+        final: Sequence[GroundTerm] = (),
+    ) -> None:
+        """Begin a program.
+
+        Args:
+            geometry: of the scene.
+            margins: distances that it keeps.
+            lasting: terms that hold all the time.
+            final: terms that hold at the end.
+        """
         robot = kinematics_of(geometry.scene.robot.description)
         self._domain = geometry.domain
         self._context = Context(geometry, robot, kernel_table(robot), margins)
+        self._final = final
+        for term in lasting:
+            self._add(term.name, *term.symbols, **term.options)
 
     def build(self, skeleton: Skeleton) -> Formulation:
         """The program of a skeleton whose actions are applicable one after the other.
@@ -56,12 +75,18 @@ class Formulator:
         """
         context = self._context
         at_switch, after_action = [], []
-        for action in skeleton:
-            ground = self._domain.bind(action)
+        actions = [self._domain.bind(action) for action in skeleton]
+        last = {ground.body: index for index, ground in enumerate(actions)}
+        self._aim(last)
+        for ground in actions:
+            action = ground.action
             context.begin(successor(context.state, action), straight_lines(ground.motion))
             at_switch.append(self._contact(ground))
             self._switch(ground)
             after_action.append(context.keyframe())
+        for term in self._final:
+            context.action = last.get(term.symbols[0], context.action)
+            self._add(term.name, *term.symbols, **term.options)
         return Formulation(
             program=context.program.build(),
             constants=np.array(context.program.constants),
@@ -71,6 +96,22 @@ class Formulator:
             at_switch=tuple(at_switch),
             after_action=tuple(after_action),
         )
+
+    def _aim(self, last: Mapping[str, int]) -> None:
+        """Let the last action on each body whose place matters aim at that place."""
+        for term in self._final:
+            box, _ = term.symbols
+            if box in last:
+                self._context.aims[last[box], box] = self._drawn(term)
+
+    def _drawn(self, term: GroundTerm) -> Aim:
+        goal, context = find_term(term.name), self._context
+        assert isinstance(goal, GoalTerm)
+
+        def aim(generator: np.random.Generator, count: int, below: Array) -> Array:
+            return goal.draw(context, generator, count, *term.symbols, below, **term.options)
+
+        return aim
 
     def _contact(self, ground: GroundInstruction) -> KeyframeSlots:
         """What the action declares for its switch."""
@@ -86,7 +127,7 @@ class Formulator:
         context, body = self._context, ground.body
         support = context.state.support_of(body)
         context.attach(body, ground.parent)
-        if body in context.held and context.state.carried_by(body):
+        if body in context.held and context.level(body, context.state):
             self._add("level", body)
         below = None if support is None else context.after.support_of(support)
         if support is not None and below is not None:
@@ -141,14 +182,19 @@ def check_terms(domain: Domain) -> None:
     Raises:
         InputError: the first for which that is not so.
     """
-    for instruction in domain.instructions:
-        for term in instruction.contact:
-            where = f"domain {domain.name}: {instruction.name}: {term.name}"
+    goal_types = (*domain.goal_types, *domain.further_goals)
+    declared: list[tuple[str, tuple[Term, ...], tuple[Number, ...]]]
+    declared = [(one.name, one.contact, ()) for one in domain.instructions]
+    declared += [(one.name, (*one.final, *one.lasting), one.numbers) for one in goal_types]
+    for owner, terms, numbers in declared:
+        for term in terms:
+            where = f"domain {domain.name}: {owner}: {term.name}"
             if term.name not in term_names():
                 raise InputError(where, "is an unknown term", ", ".join(term_names()))
             add = find_term(term.name).add
             try:
-                signature(add).bind(None, *term.arguments, **term.options)
+                options = {**term.options, **{number.name: 0.0 for number in numbers}}
+                signature(add).bind(None, *term.arguments, **options)
             except TypeError as error:
                 accepted = ", ".join(list(signature(add).parameters)[1:])
                 raise InputError(where, str(error), accepted) from None

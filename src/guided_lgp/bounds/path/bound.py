@@ -5,6 +5,7 @@ from itertools import chain, islice
 
 from guided_lgp.bounds.coarse import CoarseBound
 from guided_lgp.bounds.deadline import NEVER, Deadline
+from guided_lgp.bounds.goals import NO_TERMS, GoalTerms
 from guided_lgp.bounds.path.assembly import assemble
 from guided_lgp.bounds.path.grips import grips_of
 from guided_lgp.bounds.path.motions import Mover
@@ -34,7 +35,12 @@ class PathBound:
     """
 
     def __init__(
-        self, scene: Scene, coarse: CoarseBound, solutions: int, deadline: Deadline = NEVER
+        self,
+        scene: Scene,
+        coarse: CoarseBound,
+        solutions: int,
+        deadline: Deadline = NEVER,
+        goals: GoalTerms = NO_TERMS,
     ) -> None:
         """Prepare for one scene.
 
@@ -43,10 +49,12 @@ class PathBound:
             coarse: gives further coarse solutions.
             solutions: largest number of coarse solutions to try.
             deadline: after which it gives up.
+            goals: terms that the motion keeps.
         """
         self._scene = scene
         self._coarse = coarse
         self._solutions = solutions
+        self._goals = goals
         self._mover = Mover(scene, _ITERATIONS, deadline)
         self._grips = {
             (gripper, box.name): grips_of(box, arm)
@@ -82,6 +90,7 @@ class PathBound:
                 solution.at_switch,
                 furthest,
                 number,
+                self._goals,
             )
             limit = self._mover.queries + _QUERIES * (len(skeleton) + 4)
             outcomes = self._search(task, OutcomeSampler(task), limit, 0, task.start)
@@ -90,7 +99,7 @@ class PathBound:
             steps = [step for outcome in outcomes for step in outcome.steps]
             for chosen in (optimise(self._mover, steps), steps):
                 trajectory = assemble(self._mover.robot, task.start, chosen)
-                report = verify_path(self._world, skeleton, trajectory)
+                report = verify_path(self._world, skeleton, trajectory, self._goals)
                 if report.violation is None:
                     break
             if report.violation is not None:

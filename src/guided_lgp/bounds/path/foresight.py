@@ -95,7 +95,14 @@ class Foresight:
         closing = action.closing
         opened = {} if closing is None else {closing: task.opened(closing)}
         fingers = {**situation.fingers, **opened}
-        return Situation(task.states[later], contact.q, fingers, standing, {})
+        return replace(
+            situation,
+            state=task.states[later],
+            q=contact.q,
+            fingers=fingers,
+            standing=standing,
+            carried={},
+        )
 
     def _possible(
         self,

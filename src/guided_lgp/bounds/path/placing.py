@@ -59,10 +59,9 @@ class PlacementSampler:
         elif strategy == "elsewhere":
             placements = self._alternatives(index, situation, support, reference)
         half_height = task.boxes[action.body].size[2] / 2
-        return [
-            Place(placed(support, placement, half_height), way)
-            for placement, way in product(placements, ways)
-        ]
+        poses = [placed(support, placement, half_height) for placement in placements]
+        suitable = [pose for pose in poses if task.suits(index, pose, boxes)]
+        return [Place(pose, way) for pose, way in product(suitable, ways)]
 
     def _alternatives(
         self, index: int, situation: Situation, support: Array, reference: Array

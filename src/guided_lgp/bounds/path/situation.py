@@ -53,6 +53,8 @@ class Situation:
     """World pose (7,) of every box that no gripper carries."""
     carried: Mapping[str, tuple[str, Array]]
     """Gripper, and pose (7,) in its tool frame, of every box held or standing on a held one."""
+    upright: frozenset[str] = frozenset()
+    """Boxes that stay level on their way, whatever they carry."""
 
     def boxes(self, arms: Mapping[str, PlacedArm]) -> dict[str, Array]:
         """World pose (7,) of every box."""
@@ -64,9 +66,9 @@ class Situation:
         return poses
 
     def loaded(self, gripper: str) -> bool:
-        """Whether a gripper holds a box with others on it, which has to stay level."""
+        """Whether a gripper holds a box that has to stay level: with others on it, as a rule."""
         held = self.state.held_by(gripper)
-        return held is not None and bool(self.state.carried_by(held))
+        return held is not None and (held in self.upright or bool(self.state.carried_by(held)))
 
     def around(self, gripper: str, touching: Iterable[tuple[str, str]] = ()) -> Surroundings:
         """What stands still while the gripper's arm moves."""

@@ -6,6 +6,7 @@ from enum import IntEnum
 
 import numpy as np
 
+from guided_lgp.bounds.goals import GoalTerms
 from guided_lgp.bounds.path.grips import Grips
 from guided_lgp.bounds.path.motions import Motion, Mover, Surroundings, Tool, Transit
 from guided_lgp.bounds.path.situation import Situation, Step
@@ -113,6 +114,7 @@ class Task:
         contacts: Sequence[Keyframe],
         failure: FurthestFailure,
         seed: int,
+        goals: GoalTerms,
     ) -> None:
         self.mover = mover
         self.arms = mover.arms
@@ -120,6 +122,8 @@ class Task:
         self.manoeuvres = [manoeuvre(domain.bind(action)) for action in skeleton]
         self.contacts = contacts
         self.failure = failure
+        self.goals = goals
+        self.scene = scene
         self.rng = np.random.default_rng(np.random.SeedSequence([7, seed]))
         self.boxes = {box.name: box for box in scene.boxes}
         self.tables = {table.name: table for table in scene.tables}
@@ -133,6 +137,7 @@ class Task:
             {gripper: arm.fingers.closed for gripper, arm in mover.robot.arms.items()},
             initial_poses(scene),
             {},
+            goals.upright,
         )
 
     def __len__(self) -> int:
@@ -148,6 +153,13 @@ class Task:
         while (support := self.states[index].support_of(body)) is not None:
             body = support
         return body
+
+    def suits(self, index: int, place: Array, boxes: Mapping[str, Array]) -> bool:
+        """Whether goals allow the place (7,) where an action puts its body down for good."""
+        body = self.manoeuvres[index].body
+        if not self.goals.final or self.next_move(index) is not None:
+            return True
+        return not self.goals.about(body).faults(self.scene, {**boxes, body: place})
 
     def carrier(self, index: int, body: str) -> str | None:
         """The gripper that holds a body, or what the body stands on, before an action."""

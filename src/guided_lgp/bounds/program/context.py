@@ -1,6 +1,6 @@
 """What is where at a point of a skeleton, in slots of a program: the mode tree with geometry."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -18,7 +18,11 @@ from guided_lgp.bounds.program.slots import (
     KeyframeSlots,
     PlanarPose,
 )
+from guided_lgp.bounds.results import Array
 from guided_lgp.logic import State
+
+Aim = Callable[[np.random.Generator, int, Array], Array]
+"""Draws places (count, 3) on a support (4,) for a start; see ``GoalTerm``."""
 
 
 class Start(Protocol):
@@ -76,6 +80,10 @@ class Context:
         """What each action leaves to the start, in the order of the terms."""
         self.balanced: set[tuple[object, ...]] = set()
         self.separated: set[frozenset[tuple[int, int, int]]] = set()
+        self.upright: frozenset[str] = frozenset()
+        """Boxes that stay level on their way, whatever they carry."""
+        self.aims: dict[tuple[int, str], Aim] = {}
+        """Where goals want the boxes that actions put down for good, by action and box."""
         self.action = -1
         self.state: State = geometry.scene.state
         """Before the action."""
@@ -113,7 +121,7 @@ class Context:
         self.standing = {
             gripper: configuration
             for gripper, configuration in self.standing.items()
-            if (held := self.state.held_by(gripper)) is not None and self.state.standing_on(held)
+            if (held := self.state.held_by(gripper)) is not None and self.level(held, self.state)
         }
         self.acting = {}
 
@@ -121,6 +129,10 @@ class Context:
         """The configurations that have been added since the last call."""
         added, self.added = self.added, []
         return added
+
+    def level(self, held: str, state: State) -> bool:
+        """Whether a hand keeps what it holds level."""
+        return held in self.upright or bool(state.standing_on(held))
 
     # the mode tree
 

@@ -64,14 +64,17 @@ class SceneGeometry:
         yaw: float,
         raised: float,
     ) -> None:
-        cosine, sine = np.cos(self._turn), np.sin(self._turn)
         x, y, z = position
         self.bodies[name] = Body(name, half, 8 * half[0] * half[1] * half[2])
-        self.poses[name] = (
+        self.poses[name] = (*self.in_robot(x, y, yaw), z + raised + float(self._shift[2]))
+
+    def in_robot(self, x: float, y: float, yaw: float) -> tuple[float, float, float]:
+        """x, y and yaw in the robot's frame of a place in the world."""
+        cosine, sine = np.cos(self._turn), np.sin(self._turn)
+        return (
             float(cosine * x - sine * y + self._shift[0]),
             float(sine * x + cosine * y + self._shift[1]),
             yaw + self._turn,
-            z + raised + float(self._shift[2]),
         )
 
     def in_world(self, x: float, y: float, yaw: float, z: float) -> Array:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from guided_lgp.bounds.checks import Pose, Top, Vector, angle_of, axes_of
-from guided_lgp.bounds.program.context import Context, Start
+from guided_lgp.bounds.program.context import Aim, Context, Start
 from guided_lgp.bounds.program.draft import Draft
 from guided_lgp.bounds.program.slots import HeldBox, PlanarPose, StraightSegment
 from guided_lgp.bounds.results import Array
@@ -35,6 +35,8 @@ class Placement:
     half: tuple[float, float]
     """Half extents (m) within which the centre must be."""
     carried: tuple[tuple[PlanarPose, PlanarPose], ...]
+    aim: Aim | None
+    """Where a goal wants it, if one does."""
     others: Sequence[Start]
     """What else the action leaves to the start; the separations from neighbours are there."""
 
@@ -58,13 +60,16 @@ class Placement:
     def _draw(self, draft: Draft) -> Array:
         """Poses (CANDIDATES, 4) on the support."""
         support = draft.pose(self.support)
+        height = np.full(CANDIDATES, support[3] + self.pose.offset - self.support.offset)
+        if self.aim is not None:
+            return np.column_stack([self.aim(draft.generator, CANDIDATES, support), height])
         local = draft.generator.uniform(-1, 1, (CANDIDATES, 2)) * np.array(self.half)
         cosine, sine = np.cos(support[2]), np.sin(support[2])
         candidates = np.empty((CANDIDATES, 4))
         candidates[:, 0] = support[0] + cosine * local[:, 0] - sine * local[:, 1]
         candidates[:, 1] = support[1] + sine * local[:, 0] + cosine * local[:, 1]
         candidates[:, 2] = draft.generator.uniform(-np.pi / 2, np.pi / 2, CANDIDATES)
-        candidates[:, 3] = support[3] + self.pose.offset - self.support.offset
+        candidates[:, 3] = height
         return candidates
 
     def _overlaps(self, draft: Draft, candidates: Array) -> Array:
@@ -99,6 +104,7 @@ def _add(context: Context, box: str, support: str) -> None:
             support=below,
             half=inner(context, support),
             carried=tuple(zip(before, (context.pose[name] for name in riders), strict=True)),
+            aim=context.aims.get((context.action, box)),
             others=context.choices[-1],
         )
     )

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from guided_lgp.bounds.program.kernels import Kernel
 from guided_lgp.bounds.program.kinematics import RobotKinematics
+from guided_lgp.bounds.results import Array
 
 
 def _none(robot: RobotKinematics) -> tuple[Kernel, ...]:
@@ -21,6 +22,19 @@ class Term:
 
     add: Callable[..., None]
     kernels: Callable[[RobotKinematics], tuple[Kernel, ...]] = _none
+
+
+@dataclass(frozen=True, kw_only=True)
+class GoalTerm(Term):
+    """A constraint on where a box is at the end, which goal types name.
+
+    ``draw(context, generator, count, box, support, below, **numbers)`` gives places (count, 3) for
+    starts: x, y (m) and yaw (rad) in the robot's frame, on a support at ``below`` (4,).
+    ``check(size, placement, top, **numbers)`` is by how much (m or rad) the term does not hold.
+    """
+
+    draw: Callable[..., Array]
+    check: Callable[..., float]
 
 
 class UngraspableError(Exception):

@@ -7,6 +7,7 @@ import numpy as np
 
 from guided_lgp.bounds.checks import Violation, body_names, box_sizes, overlap_name
 from guided_lgp.bounds.collision import PlanningScene, checker_of
+from guided_lgp.bounds.goals import NO_TERMS, GoalTerms
 from guided_lgp.bounds.results import Array, Trajectory
 from guided_lgp.bounds.verify.attachments import switches_of
 from guided_lgp.bounds.verify.geometry import declared, grasp_faults, placement_faults
@@ -34,7 +35,9 @@ class PathReport:
     """m, outside the declared contacts."""
 
 
-def verify_path(world: World, skeleton: Skeleton, trajectory: Trajectory) -> PathReport:
+def verify_path(
+    world: World, skeleton: Skeleton, trajectory: Trajectory, goals: GoalTerms = NO_TERMS
+) -> PathReport:
     """Check a whole motion.
 
     The motion starts with all arms at their side and the boxes where the scene has them. It
@@ -48,6 +51,7 @@ def verify_path(world: World, skeleton: Skeleton, trajectory: Trajectory) -> Pat
         world: of the scene.
         skeleton: the actions that the motion carries out.
         trajectory: lists all arm and finger joints.
+        goals: terms that hold on the way and at the end.
     """
     switches = switches_of(world.scene, skeleton, trajectory)
     if isinstance(switches, Violation):
@@ -64,11 +68,16 @@ def verify_path(world: World, skeleton: Skeleton, trajectory: Trajectory) -> Pat
     if fault is not None:
         action = sum(trajectory.times[switch] < fault.time for switch in switches)
         return PathReport(Violation(fault.constraint, fault.amount, int(action), fault.time))
-    return _walk(world, skeleton, switches, q, trajectory.times)
+    return _walk(world, skeleton, switches, q, trajectory.times, goals)
 
 
 def _walk(
-    world: World, skeleton: Skeleton, switches: list[int], q: Array, times: Array
+    world: World,
+    skeleton: Skeleton,
+    switches: list[int],
+    q: Array,
+    times: Array,
+    goals: GoalTerms,
 ) -> PathReport:
     """Follow the motion from mode to mode."""
     states = [world.scene.state]
@@ -81,13 +90,16 @@ def _walk(
         state, after = states[index], states[index + 1]
         rows = slice(first, last + 1)
         phase = Phase(world.scene, state, boxes, q[rows], times[rows])
-        violation = phase.tilt_fault() or collisions.first_fault(phase, before, after)
+        violation = phase.tilt_fault(goals.upright) or collisions.first_fault(phase, before, after)
         violation = violation or _contact_fault(phase, after)
         if violation is not None:
             violation = replace(violation, action=min(index, len(skeleton) - 1))
             return PathReport(violation, collisions.checked, collisions.deepest)
         boxes, before = phase.boxes_at(-1), state
-    return PathReport(None, collisions.checked, collisions.deepest)
+    missed = next(iter(goals.faults(world.scene, boxes)), None)
+    if missed is not None:
+        missed = replace(missed, action=len(skeleton) - 1, time=float(times[-1]))
+    return PathReport(missed, collisions.checked, collisions.deepest)
 
 
 class _Collisions:

@@ -1,6 +1,6 @@
 """The motion of a plan in one mode, in small steps, and the boxes along it."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from itertools import product
 
 import numpy as np
@@ -82,10 +82,10 @@ class Phase:
                     touches[sample].add((box, gripper))
         return touches
 
-    def tilt_fault(self) -> Violation | None:
-        """A box that carries others, or is carried, must stay level."""
+    def tilt_fault(self, upright: Collection[str] = ()) -> Violation | None:
+        """A box that carries others, or is carried, must stay level, and so must some others."""
         for held, _ in self.state.held:
-            if self.state.standing_on(held):
+            if held in upright or self.state.standing_on(held):
                 tilted = tilt(self._moving[held])
                 if tilted.max() > CARRY_ANGLE:
                     time = float(self.times[np.argmax(tilted > CARRY_ANGLE)])

@@ -1,0 +1,109 @@
+"""Goals that say more than symbols, read against a scene."""
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from guided_lgp.errors import InputError
+from guided_lgp.logic import Goal, Objective
+from guided_lgp.scene.footprints import footprint, gap, inset
+from guided_lgp.scene.model import Box, Scene, Table
+from guided_lgp.scene.tolerances import FLOAT
+
+_REACH = 100.0
+"""Largest number (m or rad) that a goal may give."""
+
+
+def complete_objective(objective: Objective, scene: Scene) -> Objective:
+    """The objective with what its goals may leave out: the support on which a pose stands.
+
+    Raises:
+        InputError: a number cannot be read or is out of range, or nothing is below a pose.
+    """
+    return tuple(dict.fromkeys(_complete(goal, scene) for goal in objective))
+
+
+def in_the_way(body: str, objective: Objective, scene: Scene) -> frozenset[str]:
+    """The boxes that stand, at the start, where goals want another box to be in the end."""
+    found: set[str] = set()
+    box = next(box for box in scene.boxes if box.name == body)
+    for goal in objective:
+        for term in scene.symbols.domain.final_terms(goal):
+            if term.symbols[0] == body and "yaw" in term.options:
+                found |= _overlapped(box, term.options, scene)
+    return frozenset(found)
+
+
+def _overlapped(body: Box, numbers: Mapping[str, str | float], scene: Scene) -> set[str]:
+    """The other boxes that a box overlaps where its goal is."""
+    x, y, z, yaw = (float(numbers[name]) for name in ("x", "y", "z", "yaw"))
+    there = body.model_copy(update={"position": (x, y, z), "yaw": yaw})
+    return {
+        other.name
+        for other in scene.boxes
+        if other.name != body.name
+        and abs(other.position[2] - z) < (body.size[2] + other.size[2]) / 2 - FLOAT
+        and gap(footprint(there), footprint(other)) < 0
+    }
+
+
+def _complete(goal: Goal, scene: Scene) -> Goal:
+    domain = scene.symbols.domain
+    for one in domain.further_goals:
+        if one.name == goal.kind and one.derived is not None:
+            place = one.parameters.index(one.derived)
+            if _is_number(goal.symbols[place : place + 1]):
+                goal = _with_support(goal, place, scene)
+    for term in domain.final_terms(goal):
+        _check_numbers(goal, term.options)
+    return goal
+
+
+def _is_number(words: tuple[str, ...]) -> bool:
+    try:
+        return bool([float(word) for word in words])
+    except ValueError:
+        return False
+
+
+def _with_support(goal: Goal, place: int, scene: Scene) -> Goal:
+    """The goal with the name of the support whose top is where its box would stand."""
+    body = next((box for box in scene.boxes if box.name in goal.symbols[:place]), None)
+    if body is None:
+        raise InputError(f"goal {goal}", "unknown box", ", ".join(scene.symbols.boxes))
+    supports: tuple[Table | Box, ...] = (*scene.tables, *scene.boxes)
+    for support in supports:
+        symbols = (*goal.symbols[:place], support.name, *goal.symbols[place:])
+        whole = Goal(goal.kind, symbols)
+        (term,) = scene.symbols.domain.final_terms(whole)
+        if support.name != body.name and _stands(body, support, term.options):
+            return whole
+    heights = ", ".join(f"z = {z:.3f} on {name}" for name, z in _heights(body, scene))
+    raise InputError(f"goal {goal}", f"nothing is there for {body.name} to stand on", heights)
+
+
+def _stands(body: Box, support: Table | Box, numbers: Mapping[str, str | float]) -> bool:
+    """Whether the body would stand on the top of a support, where that is at the start."""
+    x, y, z, tolerance = (float(numbers[name]) for name in ("x", "y", "z", "tolerance"))
+    height = _top(support) + body.size[2] / 2
+    return abs(z - height) <= tolerance and bool(inset(footprint(support), np.array([x, y])) >= 0)
+
+
+def _top(support: Table | Box) -> float:
+    return support.position[2] + (support.size[2] / 2 if isinstance(support, Box) else 0.0)
+
+
+def _heights(body: Box, scene: Scene) -> Iterator[tuple[str, float]]:
+    for table in scene.tables:
+        yield table.name, _top(table) + body.size[2] / 2
+
+
+def _check_numbers(goal: Goal, numbers: Mapping[str, str | float]) -> None:
+    for name, value in numbers.items():
+        if abs(float(value)) > _REACH:
+            raise InputError(f"goal {goal}", f"{name} is {value}", f"up to {_REACH:g} m or rad")
+        if name in ("tolerance", "turn") and float(value) <= 0:
+            raise InputError(f"goal {goal}", f"{name} is {value}", "more than 0")
+    for axis in ("x", "y"):
+        if f"{axis}0" in numbers and float(numbers[f"{axis}0"]) >= float(numbers[f"{axis}1"]):
+            raise InputError(f"goal {goal}", "the region is empty", f"{axis}0 less than {axis}1")

@@ -1,0 +1,53 @@
+"""Goals read against a scene: the support of a pose, numbers, and what stands in the way."""
+
+from pathlib import Path
+
+import pytest
+
+from guided_lgp.errors import InputError
+from guided_lgp.logic import parse_objective
+from guided_lgp.scene import load_scene
+from guided_lgp.scene.goals import complete_objective, in_the_way
+
+SCENE = load_scene(Path(__file__).parents[2] / "examples" / "three_boxes.json")
+
+
+def completed(goal: str) -> str:
+    (found,) = complete_objective(parse_objective([goal]), SCENE)
+    return str(found)
+
+
+def test_the_support_of_a_pose_is_found() -> None:
+    assert completed("(at red 0.5 -0.3 0.65 0)") == "(at red tab2 0.5 -0.3 0.65 0)"
+    assert completed("(at red 0.5 0.3 0.651 0)") == "(at red tab1 0.5 0.3 0.651 0)"
+    # on top of green
+    assert completed("(at red 0.5 -0.25 0.75 0)") == "(at red green 0.5 -0.25 0.75 0)"
+
+
+@pytest.mark.parametrize("goal", ["(on red green)", "(at red tab2 0.5 -0.3 0.65 0 0.02)"])
+def test_what_is_whole_stays_as_it_is(goal: str) -> None:
+    assert completed(goal) == goal
+
+
+@pytest.mark.parametrize(
+    ("goal", "fault"),
+    [
+        ("(at red 0.5 -0.3 0.8 0)", r"nothing is there for red to stand on \(accepted: z = 0.650"),
+        ("(at red 2 2 0.65 0)", "nothing is there"),
+        ("(at pink 0.5 -0.3 0.65 0)", "unknown box"),
+        ("(at red tab2 0.5 -0.3 1e9 0)", "z is 1000000000.0"),
+        ("(at red tab2 0.5 -0.3 0.65 0 -0.01)", "tolerance is -0.01"),
+        ("(in red tab2 0.1 0 0.1 1)", "the region is empty"),
+    ],
+)
+def test_bad_numbers_are_told(goal: str, fault: str) -> None:
+    with pytest.raises(InputError, match=fault):
+        completed(goal)
+
+
+def test_what_stands_where_a_box_is_wanted() -> None:
+    near_green = parse_objective(["(at red tab2 0.5 -0.33 0.65 0)"])
+    assert in_the_way("red", near_green, SCENE) == {"green"}
+    on_green = parse_objective(["(at red green 0.5 -0.25 0.75 0)"])
+    assert in_the_way("red", on_green, SCENE) == frozenset()
+    assert in_the_way("red", parse_objective(["(in red tab2 -0.1 -0.1 0.1 0.1)"]), SCENE) == set()
