@@ -12,14 +12,14 @@ import numpy as np
 
 from guided_lgp.logic import applicable_actions, parse_objective
 from guided_lgp.policy.arrays import FloatArray
+from guided_lgp.policy.declaration import DeclaredPolicy
 from guided_lgp.policy.paper.inference import chain_log_probabilities
 from guided_lgp.policy.paper.model import Model, load_model
-from guided_lgp.policy.relational.inference import RelationalPolicy, load_relational
+from guided_lgp.policy.registry import POLICIES
 from guided_lgp.scene import Scene
 from guided_lgp.scene.model import Box, Table, parse_scene
 from guided_lgp.search.observation import observe, start
 
-_RELATIONAL = "relational"
 _SCENE = Scene(
     name="example",
     tables=(Table(name="tab1", position=(0.54, 0.33, 0.60), half_extents=(0.17, 0.20)),),
@@ -53,10 +53,10 @@ class Network:
         return probabilities
 
 
-class Relational:
-    """Probabilities of the first actions in a scene, by the relational policy."""
+class FirstActions:
+    """Probabilities of the first actions in a scene, by a policy."""
 
-    def __init__(self, policy: RelationalPolicy) -> None:
+    def __init__(self, policy: DeclaredPolicy) -> None:
         self._policy = policy
 
     def predict(self, inputs: Mapping[str, Any]) -> list[str]:
@@ -90,11 +90,12 @@ class Relational:
         return {str(action): probability for action, probability in pairs}
 
 
-def _load_pyfunc(data_path: str) -> Network | Relational:
+def _load_pyfunc(data_path: str) -> Network | FirstActions:
     """Called by MLflow with the folder that :func:`log_model` has logged."""
     (weights,) = Path(data_path).glob("*.safetensors")
-    if weights.stem == _RELATIONAL:
-        return Relational(load_relational(weights.parent))
+    for declared in POLICIES.values():
+        if declared.networks == (weights.stem,):
+            return FirstActions(declared.read(weights.parent))
     return Network(load_model(weights.parent, weights.stem))
 
 
@@ -103,7 +104,7 @@ def log_model(folder: Path, name: str) -> None:
 
     Args:
         folder: with ``<name>.safetensors`` and ``<name>.json`` alone.
-        name: ``instruction``, ``grasp``, ``place`` or ``relational``.
+        name: of a network that a policy declares; a policy of a single network is logged whole.
     """
     import mlflow
     import pandas as pd

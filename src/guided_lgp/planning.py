@@ -24,7 +24,13 @@ from guided_lgp.logic import (
 from guided_lgp.logic.objectives import asks_for_places, check_objective
 from guided_lgp.params import BoundsParams, PlanningParams, SearchLimits, load_planning
 from guided_lgp.paths import MODELS
-from guided_lgp.policy.registry import POLICIES, load_policy, missing_instructions
+from guided_lgp.policy.registry import (
+    DEFAULT_POLICY,
+    POLICIES,
+    load_policy,
+    missing_instructions,
+)
+from guided_lgp.policy.uniform import Uniform
 from guided_lgp.scene import Scene, load_scene
 from guided_lgp.scene.goals import complete_objective, in_the_way
 from guided_lgp.scene.validate import validate_scene
@@ -37,12 +43,10 @@ from guided_lgp.search.planners import (
     Search,
     check_planners,
 )
-from guided_lgp.search.policy import Policy, Uniform
+from guided_lgp.search.policy import Policy
 from guided_lgp.search.problem import Problem
 from guided_lgp.search.result import REASONS, Cause, SearchResult, Times
 from guided_lgp.search.ways import widened_scene
-
-DEFAULT_POLICY = "relational"
 
 SEQUENCES_PER_ACTION = 100
 """Sequences that a search may hand to the coarse bound, beyond the limit of the experiments, for

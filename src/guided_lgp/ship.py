@@ -9,18 +9,13 @@ import yaml
 from guided_lgp.documents import read_json, write_text
 from guided_lgp.params import Params, PlanningParams, load_params
 from guided_lgp.paths import METRICS, MODELS, PARAMS, PLANNING, TRAINED
+from guided_lgp.policy.declaration import PolicyDeclaration
+from guided_lgp.policy.registry import POLICIES, TRAINED_POLICIES
+from guided_lgp.search.planners import TABLE_1
 
 CARD = "README.md"
 """The model card, beside the weights."""
 _HEADING = "# Limits of planning; written by `make ship` from params.yaml.\n"
-_SHARES = (
-    ("paper, default", "default"),
-    ("paper, objective adaptation", "adaptation"),
-    ("improved, objective adaptation", "improved_adaptation"),
-    ("relational, objective adaptation", "relational"),
-    ("no policy, best-first (control)", "uniform_best_first"),
-)
-"""Rows of the model card: what was evaluated, and its name in the metrics."""
 
 
 def ship(root: Path, models: Path = MODELS, limits: Path = PLANNING) -> None:
@@ -50,18 +45,30 @@ def model_card(params: Params, metrics: dict[str, Any]) -> str:
         metrics: shares of solutions by planner and set of objectives.
     """
     scenes, objectives = params.generate_scenes, params.build_dataset
+    policies = [
+        f"| {name} | {', '.join(_file(declared, network) for network in declared.networks)} | "
+        f"{declared.summary} |"
+        for name, declared in TRAINED_POLICIES.items()
+    ]
     rows = [
-        f"| {text} | {_share(metrics[name], 'all')} | {_share(metrics[name], 'unseen')} |"
-        for text, name in _SHARES
-        if name in metrics
+        f"| {POLICIES[planner.policy].label}, {planner.strategy} | "
+        f"{_share(metrics[key], 'all')} | {_share(metrics[key], 'unseen')} |"
+        for key, planner in TABLE_1.items()
+        if key in metrics
     ]
     return _CARD.format(
         training=scenes.training_configurations,
         test=scenes.test_configurations,
         objectives=objectives.training_objectives,
         seeds=f"{scenes.seed_training}, {objectives.seed}, {params.train_policy.seed}",
+        policies="\n".join(policies),
         rows="\n".join(rows),
     )
+
+
+def _file(declared: PolicyDeclaration, network: str) -> str:
+    """Where the weights of a network are, beside the card."""
+    return f"`{Path(declared.folder) / network}`"
 
 
 def _share(subsets: dict[str, Any], subset: str) -> str:
@@ -75,11 +82,9 @@ Written by `make ship`. Small feed-forward and message-passing networks (safeten
 score the next action of a pick-and-place task; guided-lgp reads them with NumPy. They propose;
 whether an action is possible is decided by a nonlinear program and verified in simulation.
 
-| policy | networks | takes |
+| policy | networks | what it is |
 |---|---|---|
-| paper | `instruction`, `grasp`, `place` (the paper's Table IV) | 3 boxes and 2 tables |
-| improved | the same, in `improved/`, trained on more and better ordered samples | the same |
-| relational | `relational` | any number of boxes and tables |
+{policies}
 
 **Input.** One or two goals `(on BOX TABLE)`, `(held BOX)`; what stands where; positions of
 grippers, boxes and tables (m). **Output.** A log-probability per applicable action. Sizes of boxes

@@ -31,7 +31,7 @@ def test_every_row_is_whole(name: str) -> None:
     planner = PLANNERS[name]
     assert planner.name == name
     assert SEARCHES[planner.search].follows_policy == bool(planner.policy)
-    assert (planner.table_1 in TABLE_1) == (planner.table_1 is not None)
+    assert (planner.table_1 in TABLE_1) == bool(planner.table_1)
     if planner.table_3:
         assert planner_style(planner)["color"].startswith("#")
 

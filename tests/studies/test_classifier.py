@@ -7,7 +7,7 @@ from guided_lgp.domains import load_domain
 from guided_lgp.errors import InputError
 from guided_lgp.logic import State, Symbols, applicable_actions, parse_objective, successor
 from guided_lgp.params import Network
-from guided_lgp.search.policy import Uniform
+from guided_lgp.policy.uniform import Uniform
 from guided_lgp.studies.classifier import (
     FEATURES,
     FeasibilityAware,

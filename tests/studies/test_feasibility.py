@@ -11,9 +11,9 @@ from test_studies import copy_models, enumerate_all, root
 from guided_lgp.errors import InputError
 from guided_lgp.logic import parse_objective
 from guided_lgp.params import Network, SearchLimits, load_params
+from guided_lgp.policy.uniform import Uniform
 from guided_lgp.scene import load_scenes
 from guided_lgp.search import best_first
-from guided_lgp.search.policy import Uniform
 from guided_lgp.search.problem import Problem
 from guided_lgp.studies import evaluate, feasibility
 from guided_lgp.studies.cases import OUTCOMES

@@ -178,7 +178,7 @@ def with_case(**changes: Any) -> dict[str, Any]:
     ("change", "fault"),
     [
         ({"tables": {"x": {"title": "x", "cases": ["none"]}}}, "tables.x.cases: unknown case"),
-        ({"seeds": []}, "seeds: .*at least 1"),
+        ({"seeds": []}, "seeds: .*fewer than 1"),
         ({"cases": {"a": {"policy": "paper"}}}, "cases.a.title: missing"),
         ({"cases": {"a": {**SMALL, "of": 1}}}, "cases.a.of: unknown key .*policy"),
         (with_case(configurations=53), "cases.more.configurations: is 53 .*1 to 52"),

@@ -15,7 +15,7 @@ from guided_lgp.documents import STANDARD_OUTPUT
 from guided_lgp.domains import domain_names
 from guided_lgp.errors import InputError
 from guided_lgp.paths import MODELS, PLANNING
-from guided_lgp.policy.registry import POLICIES
+from guided_lgp.policy.registry import DEFAULT_POLICY, POLICIES
 from guided_lgp.search.planners import DEFAULT_SEARCH, SEARCHES
 
 app = typer.Typer()
@@ -64,7 +64,7 @@ def plan(
             + "; ".join(f"{name}: {declared.summary}" for name, declared in POLICIES.items())
             + ".",
         ),
-    ] = "relational",
+    ] = DEFAULT_POLICY,
     domain: Annotated[
         str | None,
         typer.Option(

@@ -4,8 +4,8 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from guided_lgp.policy.registry import POLICIES, load_policy
-from guided_lgp.search.planners import UNIFORM, Planner, check_planners
-from guided_lgp.search.policy import Policy, Uniform
+from guided_lgp.search.planners import Planner, check_planners
+from guided_lgp.search.policy import Policy
 
 
 def load_policies(planners: Iterable[Planner], directory: Path) -> dict[str, Policy]:
@@ -21,4 +21,4 @@ def load_policies(planners: Iterable[Planner], directory: Path) -> dict[str, Pol
     """
     check_planners(POLICIES)
     names = sorted({planner.policy for planner in planners if planner.policy})
-    return {name: Uniform() if name == UNIFORM else load_policy(name, directory) for name in names}
+    return {name: load_policy(name, directory) for name in names}

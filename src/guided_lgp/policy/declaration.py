@@ -1,9 +1,11 @@
 """What a policy says about itself, once: :mod:`guided_lgp.policy.registry` finds it."""
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
+
+from guided_lgp.params import Params
 
 if TYPE_CHECKING:
     import numpy as np
@@ -12,13 +14,11 @@ if TYPE_CHECKING:
     from guided_lgp.logic import Action, Objective, State, Symbols
 
 
-class TrainedPolicy(Protocol):
-    """A policy as a search asks it; see :class:`guided_lgp.search.policy.Policy`."""
+class DeclaredPolicy(Protocol):
+    """A policy as a search asks it; see :class:`guided_lgp.search.policy.Policy`.
 
-    @property
-    def instructions(self) -> "Collection[str]":
-        """The instructions that it can score."""
-        ...
+    One that has ``instructions`` can score these alone.
+    """
 
     def log_probabilities(
         self,
@@ -44,7 +44,23 @@ class PolicyDeclaration:
     """What it is for, for the help of the command line."""
     color: str
     """One that readers with colour-blindness can tell from the others (Okabe and Ito)."""
-    stage: str
-    """The stage that trains it."""
-    load: Callable[[Path], TrainedPolicy]
-    """Read it from a folder of models; raises :class:`InputError`, which names the stage."""
+    read: Callable[[Path], DeclaredPolicy]
+    """Read it from its folder; raises :class:`InputError`, which names the stage."""
+    stage: str = ""
+    """The stage that trains it, and its section of the parameters; empty if nothing is learnt."""
+    networks: tuple[str, ...] = ()
+    """The stems of its files."""
+    folder: str = ""
+    """Where they are in a folder of models, and the reports of their training in one of reports."""
+    symmetric: Callable[[Params], bool] = lambda params: True
+    """Whether all boxes are alike to it, as the pipeline trains it."""
+    default: bool = False
+    """Whether plans follow it if nobody asks for another."""
+
+    def load(self, models: Path) -> DeclaredPolicy:
+        """Read it from a folder of models; raises :class:`InputError`, which names the stage."""
+        return self.read(models / self.folder)
+
+    def address(self, network: str) -> str:
+        """The run of the stage that trains a network: ``train_policy@place``."""
+        return f"{self.stage}@{network}" if len(self.networks) > 1 else self.stage

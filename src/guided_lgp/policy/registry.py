@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from guided_lgp import policy
 from guided_lgp.errors import InputError
 from guided_lgp.paths import MODELS
-from guided_lgp.policy.declaration import PolicyDeclaration, TrainedPolicy
+from guided_lgp.policy.declaration import DeclaredPolicy, PolicyDeclaration
 
 if TYPE_CHECKING:
     from guided_lgp.logic import Domain
@@ -28,6 +28,12 @@ def _declared() -> Mapping[str, PolicyDeclaration]:
 POLICIES = _declared()
 """Every policy by its name, in the order of tables and legends."""
 
+TRAINED_POLICIES = {name: declared for name, declared in POLICIES.items() if declared.stage}
+"""Of these, the ones that are trained."""
+
+DEFAULT_POLICY = next(name for name, declared in POLICIES.items() if declared.default)
+"""The one for users who do not ask for any."""
+
 
 def missing_instructions(policy: object, domain: "Domain") -> tuple[str, ...]:
     """The instructions of a domain that a policy cannot score; one that does not say scores all."""
@@ -36,8 +42,8 @@ def missing_instructions(policy: object, domain: "Domain") -> tuple[str, ...]:
     return tuple(name for name in every if name not in known)
 
 
-def load_policy(name: str, directory: Path = MODELS) -> TrainedPolicy:
-    """Read a trained policy; torch is not needed.
+def load_policy(name: str, directory: Path = MODELS) -> DeclaredPolicy:
+    """Read a policy; torch is not needed.
 
     Args:
         name: one of :data:`POLICIES`.

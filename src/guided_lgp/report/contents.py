@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from guided_lgp.params import Params
+from guided_lgp.policy.registry import TRAINED_POLICIES
 from guided_lgp.report import findings
 from guided_lgp.report.document import (
     Block,
@@ -15,7 +16,6 @@ from guided_lgp.report.document import (
     Section,
 )
 from guided_lgp.report.inputs import Inputs
-from guided_lgp.report.style import POLICIES
 from guided_lgp.report.table import Table
 
 COMMAND = "dvc repro"
@@ -150,8 +150,7 @@ def compose(
 
 def _symmetric(params: Params) -> list[str]:
     """The policies to which all boxes are alike."""
-    improved = params.build_dataset.improved.boxes != "declared"
-    return [POLICIES["improved"]] * improved + [POLICIES["relational"]]
+    return [policy.label for policy in TRAINED_POLICIES.values() if policy.symmetric(params)]
 
 
 def _reproduction(params: Params) -> Sequence[Block]:

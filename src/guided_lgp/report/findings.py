@@ -9,7 +9,7 @@ from guided_lgp.report.cells import number, percent, search_time
 from guided_lgp.report.inputs import all_solved, compared
 from guided_lgp.report.metrics import Metrics
 from guided_lgp.report.scalability_figures import SOLVING
-from guided_lgp.search.planners import TABLE_3
+from guided_lgp.search.planners import BASELINE, BEST, CONTROL, PAPERS, TABLE_3
 
 QUESTION = (
     "Can a small learned policy, which proposes the next action, take the place of exhaustive "
@@ -20,12 +20,12 @@ QUESTION = (
 
 def answers(generalization: Metrics, scalability: Metrics, timing: Metrics) -> list[str]:
     """What the tables say to :data:`QUESTION`, in four sentences with their figures."""
-    printed, ours = paper.GENERALIZATION["adaptation"], generalization["adaptation"]
-    relational, control = generalization["relational"], generalization["uniform_best_first"]
+    printed = paper.GENERALIZATION[PAPERS.table_1]
+    ours, best, control = (generalization[row.table_1] for row in (PAPERS, BEST, CONTROL))
     return [
         "New scenes and goals: with the paper's networks the plan is a shortest one in "
         f"{pair(ours)} of the problems, over all and over unseen objectives (paper: "
-        f"{pair(printed)}); with the relational policy in {pair(relational)}.",
+        f"{pair(printed)}); with the relational policy in {pair(best)}.",
         "Without a policy: best-first search, whose cost counts the actions still needed, finds a "
         f"shortest plan in {pair(control)} of the same problems.",
         f"Size of the tree: {tree(scalability, timing)}",
@@ -38,13 +38,14 @@ def tree(metrics: Metrics, timing: Metrics) -> str:
     finished = [
         problem.name
         for problem in compared(metrics)
-        if (cell := metrics[problem.name].get("breadth_first")) and all_solved(cell)
+        if (cell := metrics[problem.name].get(BASELINE.name)) and all_solved(cell)
     ]
     if not finished:
         return "Breadth-first finishes no problem."
     last = finished[-1]
-    nodes = [metrics[last][name]["tree_size_mean"] for name in ("breadth_first", "guided")]
-    seconds = [search_time(timing[last][name]) for name in ("breadth_first", "guided")]
+    compared_names = BASELINE.name, PAPERS.name
+    nodes = [metrics[last][name]["tree_size_mean"] for name in compared_names]
+    seconds = [search_time(timing[last][name]) for name in compared_names]
     faster = f"{seconds[0] / seconds[1]:.1f}" if seconds[0] and seconds[1] else "–"
     return (
         f"On {last}, the largest problem that breadth-first finishes, it generates "

@@ -13,9 +13,9 @@ from guided_lgp.experiments.outcomes import GENERALIZATION, OUTCOMES, SCALABILIT
 from guided_lgp.experiments.problems import PROBLEMS, ProblemClass
 from guided_lgp.logic import format_objective, one_goal_objectives, two_goal_objectives
 from guided_lgp.paths import EVALUATION, METRICS, REPORTS, SCENES, SEQUENCES, TRAINING
+from guided_lgp.policy.registry import TRAINED_POLICIES
 from guided_lgp.report import metrics as shapes
 from guided_lgp.report.metrics import Metrics, read_evaluations, read_metrics
-from guided_lgp.report.style import NETWORKS
 from guided_lgp.scene import GeneratedScenes, Scene, load_scenes
 from guided_lgp.search.planners import TABLE_1, TABLE_3
 from guided_lgp.sequences import read_verdicts
@@ -60,12 +60,6 @@ _MEANS = (
     "coarse_s",
     "path_s",
 )
-_TRAINING = {
-    "paper": {name: (f"{name}.json", f"train_policy@{name}") for name in NETWORKS},
-    "improved": {name: (f"improved/{name}.json", f"train_improved@{name}") for name in NETWORKS},
-    "relational": {"relational": ("relational.json", "train_relational")},
-}
-"""By policy and network: the report of its training, and the stage that writes it."""
 
 
 @dataclass(frozen=True)
@@ -133,12 +127,16 @@ def load_inputs(root: Path) -> Inputs:
         scalability=mask_stopped(scalability, runs),
         timing=mask_stopped(timing, runs),
         training={
-            policy: {
-                network: read_metrics(root / TRAINING / file, stage, shapes.TRAINING)
-                for network, (file, stage) in _TRAINING[policy].items()
+            name: {
+                network: read_metrics(
+                    root / TRAINING / declared.folder / f"{network}.json",
+                    declared.address(network),
+                    shapes.TRAINING,
+                )
+                for network in declared.networks
             }
-            for policy in _TRAINING
-            if policy in evaluated
+            for name, declared in TRAINED_POLICIES.items()
+            if name in evaluated
         },
         geometry=_optional(geometry, "make bench", shapes.GEOMETRY),
         spread=_optional(spread, "make study", shapes.SPREAD),

@@ -6,10 +6,13 @@ from guided_lgp.documents import write_text
 from guided_lgp.errors import InputError
 from guided_lgp.paths import REPORTS
 from guided_lgp.report import paper
+from guided_lgp.report.cells import NONE
 from guided_lgp.report.drawing import save
 from guided_lgp.report.findings import many, pair, tree
 from guided_lgp.report.metrics import Metrics, read_evaluations
 from guided_lgp.report.scalability_figures import solved
+from guided_lgp.report.style import POLICIES
+from guided_lgp.search.planners import BEST, CONTROL, PAPERS, TABLE_1
 
 BEGIN = "<!-- findings: written by make repro -->"
 END = "<!-- end of findings -->"
@@ -89,16 +92,14 @@ def _shares(shares: Metrics) -> list[str]:
     """A small table: the paper's networks in the paper and here, and the policies added."""
     printed = paper.GENERALIZATION
     rows = [
-        ("Paper's networks", "default", pair(printed["default"]), pair(shares["default"])),
         (
-            "Paper's networks",
-            "objective adaptation",
-            pair(printed["adaptation"]),
-            pair(shares["adaptation"]),
-        ),
-        ("Paper's networks", "best-first", "–", pair(shares["best_first"])),
-        ("Relational policy", "objective adaptation", "–", pair(shares["relational"])),
-        ("No policy (control)", "best-first", "–", pair(shares["uniform_best_first"])),
+            POLICIES[planner.policy],
+            planner.strategy,
+            pair(printed[key]) if key in printed else NONE,
+            pair(shares[key]),
+        )
+        for key, planner in TABLE_1.items()
+        if planner.policy == PAPERS.policy or planner in (BEST, CONTROL)
     ]
     head = ["| Policy | Search | paper | here |", "| :--- | :--- | ---: | ---: |"]
     return [*head, *(f"| {' | '.join(row)} |" for row in rows)]

@@ -16,16 +16,9 @@ from guided_lgp.report.metrics import Metrics
 from guided_lgp.report.style import planner_style
 from guided_lgp.search.planners import RIVALS, TABLE_3
 
-DRAWN = (
-    "breadth_first",
-    "breadth_first_graph",
-    "astar",
-    "uniform_best_first",
-    "guided",
-    "relational",
-)
+DRAWN = tuple(name for name, planner in TABLE_3.items() if planner.drawn)
 """Those without a policy, the paper's, and the one that ``plan`` uses; the tables have all."""
-SOLVING = ("breadth_first", "astar", "uniform_best_first", "relational")
+SOLVING = tuple(name for name, planner in TABLE_3.items() if planner.headline)
 """Planners of the figure of the problems solved, which the README has."""
 
 

@@ -2,12 +2,10 @@
 
 from guided_lgp.domains import load_domain
 from guided_lgp.policy import registry
-from guided_lgp.search.planners import UNIFORM, Planner
+from guided_lgp.search.planners import Planner
 
-POLICIES = {name: declared.label for name, declared in registry.POLICIES.items()} | {
-    UNIFORM: "No policy (control)"
-}
-"""The policies, in the order of every table; the last one finds all actions equally good."""
+POLICIES = {name: declared.label for name, declared in registry.POLICIES.items()}
+"""The policies, in the order of every table."""
 
 POLICY_COLORS = {name: declared.color for name, declared in registry.POLICIES.items()}
 

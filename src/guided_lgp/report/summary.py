@@ -3,10 +3,12 @@
 from collections.abc import Mapping
 from statistics import fmean
 
+from guided_lgp.report import paper
 from guided_lgp.report.inputs import Inputs, compared
 from guided_lgp.report.metrics import Metrics
+from guided_lgp.search.planners import BEST, PAPERS
 
-PLANNERS = ("guided", "relational")
+PLANNERS = (PAPERS, BEST)
 """Of Table III: the paper's, and the one that ``plan`` uses first."""
 
 
@@ -22,13 +24,13 @@ def summary(inputs: Inputs) -> dict[str, dict[str, float]]:
         "accuracy": _accuracy(inputs.training),
         "shortest": _shortest(inputs.generalization, "all"),
         "unseen": _shortest(inputs.generalization, "unseen"),
-        "solved": {planner: _solved(inputs.scalability, planner) for planner in PLANNERS},
-        "coarse_calls": {planner: _calls(inputs.scalability, planner) for planner in PLANNERS},
+        "solved": {row.name: _solved(inputs.scalability, row.name) for row in PLANNERS},
+        "coarse_calls": {row.name: _calls(inputs.scalability, row.name) for row in PLANNERS},
     }
 
 
 def _accuracy(training: Mapping[str, Mapping[str, Metrics]]) -> dict[str, float]:
-    networks = {**training["paper"], **training.get("relational", {})}
+    networks = {**training[PAPERS.policy], **training.get(BEST.policy, {})}
     return {
         network: fmean(sub_policy["accuracy"] for sub_policy in report["sub_policies"].values())
         for network, report in networks.items()
@@ -36,7 +38,7 @@ def _accuracy(training: Mapping[str, Mapping[str, Metrics]]) -> dict[str, float]
 
 
 def _shortest(generalization: Metrics, subset: str) -> dict[str, float]:
-    planners = ("default", "adaptation", "relational")
+    planners = (*paper.GENERALIZATION, BEST.table_1)
     return {
         name: generalization[name][subset]["shortest"]
         for name in planners

@@ -13,7 +13,7 @@ from guided_lgp.report.cells import NONE, number, percent
 from guided_lgp.report.metrics import Metrics
 from guided_lgp.report.style import NETWORKS, POLICIES
 from guided_lgp.report.table import Table
-from guided_lgp.search.planners import TABLE_1
+from guided_lgp.search.planners import PAPERS, TABLE_1
 
 _SHARES = {
     "shortest": "Shortest solution",
@@ -95,9 +95,9 @@ def draws(metrics: Metrics) -> Table:
         metrics: by policy, search, set of objectives and figure, one value per draw.
     """
     searches = {
-        "default": "Default",
-        "adaptation": "Objective adaptation",
-        "best_first": "Best-first",
+        key: planner.strategy.capitalize()
+        for key, planner in TABLE_1.items()
+        if planner.policy == PAPERS.policy
     }
     rows, records = [], []
     for policy, name in POLICIES.items():

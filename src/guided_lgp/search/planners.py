@@ -64,6 +64,8 @@ WITHOUT_POLICY = "best-first"
 """The one where a policy cannot score all actions: complete, whatever guides it."""
 
 
+PAPER = "paper"
+"""The paper's policy."""
 UNIFORM = "uniform"
 """The policy that knows nothing: the control that shows what best-first search owes to its bound on
 the missing actions alone."""
@@ -79,15 +81,19 @@ class Planner:
     search: str
     """One of :data:`SEARCHES`."""
     policy: str = ""
-    """A trained policy, :data:`UNIFORM`, or empty: none."""
+    """A declared one, or empty: none."""
     adapt: bool = True
     """Objective adaptation (paper, Sec. III-A)."""
-    table_1: str | None = None
-    """Its key in Table I, if it takes part in the test of generalization."""
+    table_1: str = ""
+    """Its key in Table I; empty if it takes no part in the test of generalization."""
     table_3: bool = True
     """Whether it takes part in the comparison of scalability."""
     printed: bool = False
     """Whether the paper has figures for it there."""
+    drawn: bool = False
+    """Whether figures have a curve of it; tables have all."""
+    headline: bool = False
+    """Whether the README has one."""
     color: str | None = None
     """If it is not that of its policy."""
     marker: str = "D"
@@ -123,14 +129,18 @@ def _default(name: str, policy: str, table_1: str) -> Planner:
     )
 
 
-def _greedy(name: str, label: str, policy: str, table_1: str) -> Planner:
+def _greedy(
+    name: str, label: str, policy: str, table_1: str, *, drawn: bool = False, headline: bool = False
+) -> Planner:
     return Planner(
         name=name,
         label=label,
         search="guided",
         policy=policy,
         table_1=table_1,
-        printed=policy == "paper",
+        printed=policy == PAPER,
+        drawn=drawn,
+        headline=headline,
         marker="o",
         linestyle="--",
     )
@@ -148,6 +158,8 @@ PLANNERS: Mapping[str, Planner] = {
             label="Breadth-first",
             search="breadth-first",
             printed=True,
+            drawn=True,
+            headline=True,
             color="#333333",
             marker="s",
         ),
@@ -155,26 +167,36 @@ PLANNERS: Mapping[str, Planner] = {
             name="breadth_first_graph",
             label="Graph breadth-first",
             search="graph",
+            drawn=True,
             color="#E69F00",
             marker="^",
         ),
-        Planner(name="astar", label="A*", search="astar", color="#D55E00", marker="P"),
+        Planner(
+            name="astar",
+            label="A*",
+            search="astar",
+            drawn=True,
+            headline=True,
+            color="#D55E00",
+            marker="P",
+        ),
         Planner(
             name="uniform_best_first",
             label="Best-first, no policy",
             search="best-first",
             policy=UNIFORM,
             table_1="uniform_best_first",
-            color="#56B4E9",
+            drawn=True,
+            headline=True,
             marker="v",
         ),
-        _default("guided_default", "paper", "default"),
-        _greedy("guided", "Guided", "paper", "adaptation"),
-        _complete("guided_best_first", "Guided best-first", "paper", "best_first"),
+        _default("guided_default", PAPER, "default"),
+        _greedy("guided", "Guided", PAPER, "adaptation", drawn=True),
+        _complete("guided_best_first", "Guided best-first", PAPER, "best_first"),
         _default("improved_default", "improved", "improved_default"),
         _greedy("improved", "Improved", "improved", "improved_adaptation"),
         _complete("improved_best_first", "Improved best-first", "improved", "improved_best_first"),
-        _greedy("relational", "Relational", "relational", "relational"),
+        _greedy("relational", "Relational", "relational", "relational", drawn=True, headline=True),
         _complete(
             "relational_best_first", "Relational best-first", "relational", "relational_best_first"
         ),
@@ -192,15 +214,28 @@ GUIDED = tuple(name for name, planner in TABLE_3.items() if planner.trained)
 """Of these, the ones with one."""
 
 
+def _only(planners: Iterable[Planner]) -> Planner:
+    (planner,) = planners
+    return planner
+
+
+BASELINE = _only(planner for planner in TABLE_3.values() if planner.printed and not planner.policy)
+"""What the paper compares itself with."""
+PAPERS = _only(planner for planner in TABLE_3.values() if planner.printed and planner.policy)
+"""What the paper proposes, with its figures."""
+CONTROL = _only(planner for planner in TABLE_3.values() if planner.policy == UNIFORM)
+"""What best-first search owes to itself."""
+BEST = _only(planner for planner in TABLE_3.values() if planner.headline and planner.trained)
+"""What this work has to show beside the paper's."""
+
+
 def controls_last(planners: Iterable[Planner]) -> list[Planner]:
     """Planners in the order in which they run: trained ones, the control, those without policy."""
     return sorted(planners, key=lambda planner: (not planner.policy, not planner.trained))
 
 
 TABLE_1 = {
-    planner.table_1: planner
-    for planner in controls_last(PLANNERS.values())
-    if planner.table_1 is not None
+    planner.table_1: planner for planner in controls_last(PLANNERS.values()) if planner.table_1
 }
 """Planners of the test of generalization, in the order of Table I, by their keys there."""
 
@@ -216,6 +251,6 @@ def check_planners(policies: Collection[str]) -> None:
         if planner.search not in SEARCHES:
             fault = f"search {planner.search!r} is unknown"
             raise InputError(where, fault, ", ".join(SEARCHES))
-        if planner.trained and planner.policy not in policies:
+        if planner.policy and planner.policy not in policies:
             fault = f"policy {planner.policy!r} is unknown"
             raise InputError(where, fault, ", ".join(policies))

@@ -3,8 +3,6 @@
 from collections.abc import Mapping, Sequence
 from typing import Protocol, runtime_checkable
 
-import numpy as np
-
 from guided_lgp.bounds.results import Array
 from guided_lgp.logic import Action, Objective, State, Symbols
 
@@ -43,18 +41,3 @@ class SeeingPolicy(Policy, Protocol):
     def given(self, shapes: Mapping[str, Array]) -> Policy:
         """The policy where half extents (m) and yaw (rad), (4,), of boxes and tables are known."""
         ...
-
-
-class Uniform:
-    """The policy that knows nothing: shows what a search does without one."""
-
-    def log_probabilities(
-        self,
-        objective: Objective,
-        state: State,
-        symbols: Symbols,
-        positions: Mapping[str, Array],
-        actions: Sequence[Action],
-    ) -> Array:
-        """See :class:`Policy`."""
-        return np.full(len(actions), -np.log(len(actions)))

@@ -6,7 +6,7 @@ A case is trained once per seed, which draws the training objectives and seeds t
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from guided_lgp.errors import InputError
 from guided_lgp.params import (
@@ -17,31 +17,43 @@ from guided_lgp.params import (
     SearchLimits,
     Section,
     Seed,
+    TrainPolicy,
+    TrainRelational,
     load_params,
     read_params,
 )
 from guided_lgp.paths import PARAMS, REPORTS
+from guided_lgp.policy.registry import TRAINED_POLICIES
+from guided_lgp.search.planners import PAPERS, TABLE_1
 
 STUDIES = Path("studies")
 TRAINED = Path("data/studies")
 """Policies: by case, then by seed."""
 RESULTS = REPORTS / "studies"
 
+PLANNERS = {key: planner for key, planner in TABLE_1.items() if planner.policy == PAPERS.policy}
+"""The searches of Table I, by their keys there; each study brings its own policies."""
 OUTCOMES = ("shortest", "feasible", "no_solution")
 CLASSIFIER = ("without", "with")
 """The feasibility classifier, in its study."""
+
+
+def _trained(policy: str) -> str:
+    if policy not in TRAINED_POLICIES:
+        raise ValueError(f"unknown policy {policy!r} ({', '.join(TRAINED_POLICIES)})")
+    return policy
 
 
 class Case(Section):
     """A policy, by what differs from the paper's."""
 
     title: str
-    policy: Literal["paper", "improved", "relational"]
-    """Whose training: the paper's networks (Table IV), the improved ones or the relational."""
+    policy: Annotated[str, AfterValidator(_trained)]
+    """Whose training."""
     patience: Count | None = None
     """Of early stopping, if not the policy's own."""
     dropout: Annotated[float, Field(strict=True, ge=0, lt=1)] | None = None
-    """Of all three networks, if not their own; the relational policy has none."""
+    """Of all networks, if not their own; of those that have it."""
     recipe: SampleRecipe = SampleRecipe()
     """How samples are made and encoded."""
     configurations: Count | None = None
@@ -52,6 +64,13 @@ class Case(Section):
     """How samples for early stopping are chosen."""
     shuffled: Annotated[bool, Field(strict=True)] = False
     """Whether the actions of all samples are exchanged at random."""
+
+    def settings(self, params: Params) -> TrainPolicy | TrainRelational:
+        """The training of its policy in the pipeline."""
+        section: TrainPolicy | TrainRelational = getattr(
+            params, str(TRAINED_POLICIES[self.policy].stage)
+        )
+        return section
 
     def drawn_objectives(self, params: Params) -> int:
         """How many training objectives it draws."""
@@ -90,7 +109,7 @@ def load_study(root: Path) -> tuple[StudyParams, Params]:
 
     Raises:
         InputError: a file is missing or damaged; a table names a case that does not exist, or a
-            case wants dropout for the relational policy or more configurations than there are.
+            case wants dropout of a policy without it or more configurations than there are.
     """
     path = root / STUDIES / "params.yaml"
     study, params = read_params(path, StudyParams), load_params(root / PARAMS)
@@ -101,8 +120,8 @@ def load_study(root: Path) -> tuple[StudyParams, Params]:
                 raise InputError(where, f"unknown case {name!r}", ", ".join(study.cases))
     for name, case in study.cases.items():
         where, most = f"{path}: cases.{name}", params.generate_scenes.training_configurations
-        if case.policy == "relational" and case.dropout is not None:
-            raise InputError(f"{where}.dropout", "is given", "none for the relational policy")
+        if case.dropout is not None and not isinstance(case.settings(params), TrainPolicy):
+            raise InputError(f"{where}.dropout", "is given", f"none for the {case.policy} policy")
         if case.configurations is not None and case.configurations > most:
             raise InputError(f"{where}.configurations", f"is {case.configurations}", f"1 to {most}")
     return study, params

@@ -25,19 +25,15 @@ from guided_lgp.logic import (
 )
 from guided_lgp.params import BoundsParams, Params
 from guided_lgp.paths import SCENES, SEQUENCES
-from guided_lgp.policy.registry import load_policy
+from guided_lgp.policy.registry import POLICIES
 from guided_lgp.policy.split import training_objectives
 from guided_lgp.scene import Scene, load_scenes
-from guided_lgp.search.planners import TABLE_1
 from guided_lgp.search.problem import Problem
 from guided_lgp.search.result import SearchResult
 from guided_lgp.sequences import read_shortest
-from guided_lgp.studies.cases import OUTCOMES, RESULTS, TRAINED, StudyParams, load_study
+from guided_lgp.studies.cases import OUTCOMES, PLANNERS, RESULTS, TRAINED, StudyParams, load_study
 
 Row = dict[str, Any]
-
-PLANNERS = {key: planner for key, planner in TABLE_1.items() if planner.policy == "paper"}
-"""The searches of Table I, by their keys there; each study brings its own policies."""
 
 
 class CoarseBounds:
@@ -127,8 +123,7 @@ def _evaluate(task: _Evaluation) -> list[Row]:
     rows = []
     for name, seed, planner in _runs(task.study, task.table):
         case = task.study.cases[name]
-        kind = "relational" if case.policy == "relational" else "paper"  # the kind of files
-        policy = load_policy(kind, task.root / TRAINED / name / str(seed))
+        policy = POLICIES[case.policy].read(task.root / TRAINED / name / str(seed))
         seen = set(training_objectives(symbols, case.drawn_objectives(task.params), seed))
         for objective in problems(task.scene):
             search = PLANNERS[planner]

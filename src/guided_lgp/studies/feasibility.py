@@ -20,12 +20,12 @@ from guided_lgp.errors import InputError
 from guided_lgp.logic import Skeleton, format_objective, parse_skeleton, progress
 from guided_lgp.params import BoundsParams, SearchLimits
 from guided_lgp.paths import SCENES, SEQUENCES, TRAINED
-from guided_lgp.policy.registry import POLICIES, load_policy
+from guided_lgp.policy.registry import TRAINED_POLICIES, load_policy
 from guided_lgp.scene import Scene, load_scenes
 from guided_lgp.search.observation import observe, start
 from guided_lgp.search.policy import Policy
 from guided_lgp.search.problem import Problem
-from guided_lgp.studies.cases import CLASSIFIER, OUTCOMES, RESULTS, load_study
+from guided_lgp.studies.cases import CLASSIFIER, OUTCOMES, PLANNERS, RESULTS, load_study
 from guided_lgp.studies.classifier import (
     FeasibilityAware,
     FeasibilityClassifier,
@@ -35,7 +35,6 @@ from guided_lgp.studies.classifier import (
     train_classifier,
 )
 from guided_lgp.studies.evaluate import (
-    PLANNERS,
     CoarseBounds,
     Row,
     outcome,
@@ -43,7 +42,7 @@ from guided_lgp.studies.evaluate import (
     shortest_lengths,
 )
 
-SEARCHES = ("adaptation", "best_first")
+SEARCHES = tuple(key for key, planner in PLANNERS.items() if planner.adapt)
 """Of the planners of the studies: greedy with reattempts, and best-first."""
 
 CALLS = ("coarse_calls", "infeasible_calls", "policy_calls")
@@ -162,7 +161,7 @@ def evaluate(task: _Task) -> list[Row]:
     """Rows of one configuration: every policy, without and with the classifier, in every search."""
     bounds = AskedBounds(task.scene, task.bounds)
     rows = []
-    for name in POLICIES:
+    for name in TRAINED_POLICIES:
         policy = load_policy(name, task.models)
         scorers: tuple[Policy, Policy] = (policy, FeasibilityAware(policy, task.classifier))
         for classified, scorer in zip(CLASSIFIER, scorers, strict=True):
@@ -202,7 +201,7 @@ def _by_run(rows: Sequence[Row], summarize: Callable[[Sequence[Row]], Row]) -> R
             }
             for search in SEARCHES
         }
-        for policy in POLICIES
+        for policy in TRAINED_POLICIES
     }
 
 

@@ -6,9 +6,14 @@ from typing import Any
 
 from guided_lgp.documents import read_json
 from guided_lgp.report.table import Table
-from guided_lgp.studies.cases import CLASSIFIER, RESULTS
+from guided_lgp.search.planners import PAPERS
+from guided_lgp.studies.cases import CLASSIFIER, PLANNERS, RESULTS
 
-SEARCHES = {"adaptation": "greedy", "best_first": "best-first"}
+SEARCHES = {
+    key: "greedy" if planner.search == PAPERS.search else planner.search
+    for key, planner in PLANNERS.items()
+    if planner.adapt
+}
 
 Figures = Mapping[str, float]
 Runs = Mapping[str, Mapping[str, Mapping[str, Figures]]]

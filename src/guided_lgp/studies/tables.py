@@ -9,10 +9,11 @@ from typing import Any
 
 from guided_lgp.documents import read_json, write_text
 from guided_lgp.report.table import Record, Table
+from guided_lgp.studies import cases
 from guided_lgp.studies.cases import OUTCOMES, RESULTS, StudyParams, StudyTable, load_study
 from guided_lgp.studies.feasibility_tables import feasibility_tables
 
-PLANNERS = {"default": "default", "adaptation": "adaptation", "best_first": "best-first"}
+PLANNERS = {key: key.replace("_", "-") for key in cases.PLANNERS}
 SHOWN = (("shortest", "all"), ("shortest", "unseen"), ("no_solution", "all"))
 """The figures in the formatted table, by outcome and subset; the CSV file has all."""
 
@@ -50,7 +51,7 @@ def _table(name: str, content: StudyTable, figures: Figures, study: StudyParams)
     rows, records = [], []
     for case in content.cases:
         title = study.cases[case].title
-        cells = [title, str(len(figures[case]["default"]["all"]["n"]))]
+        cells = [title, str(len(figures[case][next(iter(PLANNERS))]["all"]["n"]))]
         for planner in PLANNERS:
             subsets = figures[case][planner]
             cells += [_cell(subsets[subset][outcome]) for outcome, subset in SHOWN]

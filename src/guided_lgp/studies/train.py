@@ -10,9 +10,9 @@ from guided_lgp.errors import InputError
 from guided_lgp.params import Params, TrainPolicy, TrainRelational
 from guided_lgp.paths import SCENES, SEQUENCES
 from guided_lgp.policy.paper.dataset import Dataset
-from guided_lgp.policy.paper.encoding import Encoding
 from guided_lgp.policy.paper.samples import build_dataset
 from guided_lgp.policy.paper.train import train_model
+from guided_lgp.policy.registry import TRAINED_POLICIES
 from guided_lgp.policy.relational.train import train_split
 from guided_lgp.policy.split import training_objectives
 from guided_lgp.scene import load_scenes
@@ -44,7 +44,6 @@ def train(root: Path, name: str) -> None:
         raise InputError(f"case {name!r}", "is unknown", ", ".join(study.cases))
     case = study.cases[name]
     settings = _settings(case, params)
-    networks = ["relational"] if isinstance(settings, TrainRelational) else list(Encoding().chains)
     tasks = [
         _Training(
             case=case,
@@ -56,19 +55,15 @@ def train(root: Path, name: str) -> None:
             root=root,
             directory=root / TRAINED / name / str(seed),
         )
-        for network in networks  # the instruction's first: it has all samples and takes longest
+        # the instruction's network first: it has all samples and takes longest
+        for network in TRAINED_POLICIES[case.policy].networks
         for seed in study.seeds
     ]
     parallel.run(_train, tasks, params.parallel, f"training {name}")
 
 
 def _settings(case: Case, params: Params) -> TrainPolicy | TrainRelational:
-    stages: dict[str, TrainPolicy | TrainRelational] = {
-        "paper": params.train_policy,
-        "improved": params.train_improved,
-        "relational": params.train_relational,
-    }
-    settings = stages[case.policy]
+    settings = case.settings(params)
     if case.patience is not None:
         settings = settings.model_copy(update={"patience": case.patience})
     if case.dropout is not None:

@@ -2,19 +2,31 @@
 
 from pathlib import Path
 
-from guided_lgp.policy.declaration import PolicyDeclaration, TrainedPolicy
+from guided_lgp.domains import load_domain
+from guided_lgp.params import Params
+from guided_lgp.policy.declaration import DeclaredPolicy, PolicyDeclaration
+
+NETWORKS = ("instruction", *(instruction.name for instruction in load_domain().instructions))
 
 
-def _paper(directory: Path) -> TrainedPolicy:
+def _paper(directory: Path) -> DeclaredPolicy:
     from guided_lgp.policy.paper.inference import load_networks
 
     return load_networks(directory, "train_policy")
 
 
-def _improved(directory: Path) -> TrainedPolicy:
+def _improved(directory: Path) -> DeclaredPolicy:
     from guided_lgp.policy.paper.inference import load_networks
 
-    return load_networks(directory / "improved", "train_improved")
+    return load_networks(directory, "train_improved")
+
+
+def _one_input_per_box(params: Params) -> bool:
+    return False
+
+
+def _boxes_of_the_goals_first(params: Params) -> bool:
+    return params.build_dataset.improved.boxes != "declared"
 
 
 DECLARATIONS = (
@@ -23,15 +35,20 @@ DECLARATIONS = (
         label="Paper's networks",
         summary="its networks, for 3 boxes and 2 tables",
         color="#0072B2",
+        read=_paper,
         stage="train_policy",
-        load=_paper,
+        networks=NETWORKS,
+        symmetric=_one_input_per_box,
     ),
     PolicyDeclaration(
         name="improved",
         label="Improved networks",
         summary="the same networks, better trained",
         color="#009E73",
+        read=_improved,
         stage="train_improved",
-        load=_improved,
+        networks=NETWORKS,
+        folder="improved",
+        symmetric=_boxes_of_the_goals_first,
     ),
 )

@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from guided_lgp.policy.declaration import PolicyDeclaration, TrainedPolicy
+from guided_lgp.policy.declaration import DeclaredPolicy, PolicyDeclaration
 
 
-def _relational(directory: Path) -> TrainedPolicy:
+def _relational(directory: Path) -> DeclaredPolicy:
     from guided_lgp.policy.relational.inference import load_relational
 
     return load_relational(directory)
@@ -17,7 +17,9 @@ DECLARATIONS = (
         label="Relational policy",
         summary="for any number of boxes and tables",
         color="#CC79A7",
+        read=_relational,
         stage="train_relational",
-        load=_relational,
+        networks=("relational",),
+        default=True,
     ),
 )
