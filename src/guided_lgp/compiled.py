@@ -16,7 +16,20 @@ from pathlib import Path
 
 from guided_lgp.cache import is_whole, made, private_folder
 
-_FLAGS = ("-O2", "-fPIC", "-shared", "-fno-math-errno")
+_FLAGS = ("-O2", "-fPIC", "-shared", "-fno-math-errno", "-ffp-contract=off")
+"""Optimised, but not so that a sum depends on the machine."""
+_PRELUDE = """\
+#include <stdlib.h>
+#if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__)
+#define WIDEST __attribute__((target_clones("avx512f", "avx2", "default")))
+#define INLINE inline __attribute__((always_inline))
+#else
+#define WIDEST
+#define INLINE inline
+#endif
+"""
+"""A function that is marked WIDEST, with the INLINE ones in it, is there once for each width of the
+processor's vectors: one library for all machines, and the same results on all of them."""
 _LONGEST = 120.0
 """Seconds that a compiler may take; the first run of ziglang's takes a quarter of it."""
 _PROBE = "guided_lgp_probe"
@@ -43,9 +56,9 @@ def load_compiled(name: str, source: str) -> ctypes.CDLL | None:
     Raises:
         InputError: the cache folder cannot be used.
     """
-    digest = sha256("\n".join((source, sys.platform, *_FLAGS)).encode()).hexdigest()
+    digest = sha256("\n".join((_PRELUDE, source, sys.platform, *_FLAGS)).encode()).hexdigest()
     answer = int(digest[:6], 16)
-    code = f"{source}\nint {_PROBE}(void) {{ return {answer}; }}\n"
+    code = f"{_PRELUDE}{source}\nint {_PROBE}(void) {{ return {answer}; }}\n"
     commands = list(_compilers())
     file = _any_made(name, digest) if not commands else None
     if commands:

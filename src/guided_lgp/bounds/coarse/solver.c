@@ -2,10 +2,13 @@
  * a list of kernel instances. The translation unit starts with the generated kernels and defines
  * KERNELS (the table), REACHES (closed forms), REACH_INPUTS, LARGEST_INPUT, LARGEST_ROWS and WORK.
  * `Interpreter` in solver.py is the same algorithm on CasADi's virtual machine; keep the two alike.
+ * WIDEST is explained in compiled.py.
  */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+
+#define PANEL 8 /* rows that are factorised side by side */
 
 typedef int (*function)(const double **, double **, int *, double *, int);
 
@@ -83,18 +86,31 @@ static double merit(const program *nlp, const double *values, const double *c,
     return 0.5 * sum;
 }
 
-/* Gradient g and Gauss-Newton matrix H (lower triangle, in elimination order). */
-static void linearise(const program *nlp, const double *values, const double *c,
-                      const double *multiplier, double penalty, double *g, double *H)
+/* The lower triangle of a symmetric matrix, in elimination order: of row k the columns first[k] to k,
+ * beyond which nothing is nonzero. They end at entry end[k]. */
+typedef struct {
+    int *first, *end;
+} skyline;
+
+/* Row k, such that its entry j is the one of column j. */
+static double *row_of(const skyline *shape, double *entries, int k)
+{
+    return entries + shape->end[k] - k;
+}
+
+/* Gradient g and Gauss-Newton matrix H. */
+static void linearise(const program *nlp, const skyline *shape, const double *values,
+                      const double *c, const double *multiplier, double penalty, double *g,
+                      double *H)
 {
     int n = nlp->variables;
     double x[LARGEST_INPUT], work[WORK], again[LARGEST_ROWS];
     double jacobian[LARGEST_ROWS * LARGEST_INPUT];
-    memset(H, 0, sizeof(double) * n * n);
+    memset(H, 0, sizeof(double) * (shape->end[n - 1] + 1));
     for (int v = 0; v < n; v++) {
         int k = nlp->order[v];
         g[k] = nlp->weight[v] * (values[v] - nlp->target[v]);
-        H[k * n + k] = nlp->weight[v];
+        H[shape->end[k]] = nlp->weight[v];
     }
     for (int i = 0; i < nlp->instances; i++) {
         const kernel_type *kernel = &kernel_table[nlp->kernel[i]];
@@ -124,18 +140,19 @@ static void linearise(const program *nlp, const double *values, const double *c,
                 if (scaled == 0)
                     continue;
                 g[place[a]] += scaled * shifted;
+                double *H_row = row_of(shape, H, place[a]);
                 for (int b = 0; b < count; b++)
                     if (place[b] <= place[a])
-                        H[place[a] * n + place[b]] += scaled * row[column[b]];
+                        H_row[place[b]] += scaled * row[column[b]];
             }
         }
     }
 }
 
-/* Skyline: first[k] is the first column of row k that can be nonzero. */
-static void skyline(const program *nlp, int *first)
+/* The shape of H for a program. */
+static void find_shape(const program *nlp, skyline *shape)
 {
-    int n = nlp->variables;
+    int n = nlp->variables, *first = shape->first;
     for (int k = 0; k < n; k++)
         first[k] = k;
     for (int i = 0; i < nlp->instances; i++) {
@@ -148,40 +165,77 @@ static void skyline(const program *nlp, int *first)
             if (inputs[j] < n && smallest < first[nlp->order[inputs[j]]])
                 first[nlp->order[inputs[j]]] = smallest;
     }
+    for (int k = 0; k < n; k++)
+        shape->end[k] = k - first[k] + (k ? shape->end[k - 1] + 1 : 0);
 }
 
-/* Solve (H + damping) d = -g by Cholesky within the skyline; `held` variables do not move. */
-static int step(int n, const int *first, const double *H, const double *g, const char *held,
-                double damping, double *L, double *d)
+/* Row i of H + damping, with `held` variables on their own, as lane r of a panel from a column on. */
+static void load_row(const skyline *shape, double *H, const char *held, double damping, int i,
+                     int from, double *lane)
 {
-    for (int i = 0; i < n; i++) {
-        double *row = L + i * n;
-        for (int j = first[i]; j <= i; j++) {
-            double sum = (held[i] || held[j]) ? 0 : H[i * n + j];
-            if (i == j)
-                sum = held[i] ? 1 : sum + damping;
-            const double *other = L + j * n;
-            for (int k = first[i] > first[j] ? first[i] : first[j]; k < j; k++)
-                sum -= row[k] * other[k];
-            if (i == j) {
-                if (!(sum > 0))
-                    return 0;
-                row[i] = sqrt(sum);
-            } else {
-                row[j] = sum / other[j];
+    const double *row = row_of(shape, H, i);
+    for (int k = shape->first[i]; k <= i; k++)
+        lane[(k - from) * PANEL] = held[i] || held[k] ? 0 : row[k];
+    lane[(i - from) * PANEL] = held[i] ? 1 : row[i] + damping;
+}
+
+/* Cholesky L of H + damping within the skyline; 0 if it is not positive definite. A panel is a few
+ * rows side by side, which is what processors are fast at; every entry is summed in the order of
+ * the columns as ever. */
+WIDEST static int factorise(int n, const skyline *shape, double *H, const char *held,
+                            double damping, double *L, double *panel)
+{
+    const int *first = shape->first;
+    for (int i = 0; i < n; i += PANEL) {
+        int end = i + PANEL < n ? i + PANEL : n, from = i;
+        for (int r = i; r < end; r++)
+            from = first[r] < from ? first[r] : from;
+        memset(panel, 0, sizeof(double) * (end - from) * PANEL);
+        for (int r = i; r < end; r++)
+            load_row(shape, H, held, damping, r, from, panel + r - i);
+        for (int j = from; j < end; j++) {
+            double sum[PANEL], *column = panel + (j - from) * PANEL;
+            const double *other = j < i ? row_of(shape, L, j) + from : panel + j - i;
+            int stride = j < i ? 1 : PANEL, start = j < i && first[j] > from ? first[j] : from;
+            memcpy(sum, column, sizeof sum);
+            for (int k = start - from; k < j - from; k++) {
+                double factor = other[k * stride];
+                for (int r = 0; r < PANEL; r++)
+                    sum[r] -= panel[k * PANEL + r] * factor;
             }
+            if (j >= i && !(sum[j - i] > 0))
+                return 0;
+            double pivot = j < i ? other[j - from] : sqrt(sum[j - i]);
+            for (int r = 0; r < PANEL; r++)
+                column[r] = sum[r] / pivot;
+            if (j >= i)
+                column[j - i] = pivot;
         }
+        for (int r = i; r < end; r++)
+            for (int k = first[r]; k <= r; k++)
+                row_of(shape, L, r)[k] = panel[(k - from) * PANEL + r - i];
     }
+    return 1;
+}
+
+/* Solve (H + damping) d = -g; `held` variables do not move. */
+static int step(int n, const skyline *shape, double *H, const double *g, const char *held,
+                double damping, double *L, double *panel, double *d)
+{
+    if (!factorise(n, shape, H, held, damping, L, panel))
+        return 0;
     for (int i = 0; i < n; i++) {
+        const double *row = row_of(shape, L, i);
         double sum = held[i] ? 0 : -g[i];
-        for (int k = first[i]; k < i; k++)
-            sum -= L[i * n + k] * d[k];
-        d[i] = sum / L[i * n + i];
+        for (int k = shape->first[i]; k < i; k++)
+            sum -= row[k] * d[k];
+        d[i] = sum / row[i];
     }
     for (int i = n - 1; i >= 0; i--) {
-        d[i] /= L[i * n + i];
-        for (int k = first[i]; k < i; k++)
-            d[k] -= L[i * n + k] * d[i];
+        const double *row = row_of(shape, L, i);
+        d[i] /= row[i];
+        for (int k = shape->first[i]; k < i; k++)
+            d[k] -= row[k] * d[i];
     }
     return 1;
 }
@@ -192,14 +246,16 @@ int coarse_solve(const program *nlp, const settings *options, double *values, do
                  double *report)
 {
     int n = nlp->variables, rows = nlp->rows, tried = 0;
-    double *memory = malloc(sizeof(double) * (2 * (size_t)n * n + 4 * n + 2 * rows));
-    int *first = malloc(sizeof(int) * n);
+    int *places = malloc(sizeof(int) * 2 * n);
+    skyline shape = {places, places + n};
+    find_shape(nlp, &shape);
+    size_t entries = shape.end[n - 1] + 1;
+    double *memory = malloc(sizeof(double) * (2 * entries + (4 + PANEL) * n + 2 * rows));
     char *held = malloc(n);
-    double *H = memory, *L = H + n * n, *g = L + n * n, *d = g + n, *old = d + n;
-    double *multiplier = old + n, *c_new = multiplier + rows;
+    double *H = memory, *L = H + entries, *g = L + entries, *d = g + n, *old = d + n;
+    double *multiplier = old + n, *c_new = multiplier + rows, *panel = c_new + rows;
     double penalty = options->penalty, damping = options->damping;
 
-    skyline(nlp, first);
     memset(multiplier, 0, sizeof(double) * rows);
     residuals(nlp, values, c);
     double worst = violation(nlp, c, options->slack), best = worst;
@@ -208,7 +264,7 @@ int coarse_solve(const program *nlp, const settings *options, double *values, do
            tried - improved < options->patience) {
         double value = merit(nlp, values, c, multiplier, penalty);
         for (int inner = 0; inner < options->inner && tried < options->steps; inner++) {
-            linearise(nlp, values, c, multiplier, penalty, g, H);
+            linearise(nlp, &shape, values, c, multiplier, penalty, g, H);
             for (int v = 0; v < n; v++) {
                 int k = nlp->order[v];
                 held[k] = (values[v] <= nlp->lower[v] && g[k] > 0) ||
@@ -220,7 +276,7 @@ int coarse_solve(const program *nlp, const settings *options, double *values, do
                 old[v] = values[v];
             while (!accepted && tried < options->steps) {
                 tried++;
-                if (step(n, first, H, g, held, damping, L, d)) {
+                if (step(n, &shape, H, g, held, damping, L, panel, d)) {
                     for (int v = 0; v < n; v++)
                         values[v] = fmin(fmax(old[v] + d[nlp->order[v]], nlp->lower[v]),
                                          nlp->upper[v]);
@@ -262,7 +318,7 @@ int coarse_solve(const program *nlp, const settings *options, double *values, do
     }
     *report = worst;
     free(memory);
-    free(first);
+    free(places);
     free(held);
     return tried;
 }

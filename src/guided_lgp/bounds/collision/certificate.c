@@ -1,20 +1,12 @@
 /* Which configurations are surely free of collisions: a sufficient test, many configurations at
  * once. Bodies are convex: an oriented box around each, whose frame hangs on a joint, and vertices
  * in that frame. Two bodies are apart if their spheres are, or if along the axes of one box the
- * other box, or the other's vertices, stay away. Loops over lanes are plain; compilers vectorise.
+ * other box, or the other's vertices, stay away. Loops over lanes are plain; compilers vectorise, and
+ * WIDEST and INLINE are explained in compiled.py.
  */
 #include <math.h>
 
 #define LANES 16 /* configurations at once */
-
-/* One library for all machines: the loader picks the widest vectors that the processor has. */
-#if defined(__x86_64__) && defined(__linux__) && defined(__GNUC__) && !defined(__clang__)
-#define WIDEST __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
-#define INLINE inline __attribute__((always_inline))
-#else
-#define WIDEST
-#define INLINE inline
-#endif
 
 typedef float lanes[LANES];
 
