@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 
 from guided_lgp.poses import Array, quaternion
-from guided_lgp.scene.model import Box, grasp_axis
+from guided_lgp.scene.model import Box
 
 PITCHES = (np.pi / 2, np.pi / 3, np.pi / 4, np.pi / 6, 0.0)
 """Angles (rad) at which the gripper points down when it grasps: from above to from the side."""
@@ -23,7 +23,7 @@ def grasp_poses(box: Box, palm_front: float) -> Array:
         box: where it stands.
         palm_front: x of the palm's front in the tool frame (m).
     """
-    across = grasp_axis(box.size)
+    across = 0 if box.size[0] < box.size[1] else 1
     cosine, sine = np.cos(box.yaw), np.sin(box.yaw)
     axes = np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0]])
     closing, along = axes[across], axes[1 - across]

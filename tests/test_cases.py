@@ -1,5 +1,6 @@
 """Situations that people who plan with arms run into: the right answer for each."""
 
+import math
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,8 @@ from guided_lgp.logic.objectives import parse_objective
 from guided_lgp.scene import load_scene
 
 CASES = Path(__file__).parent / "cases"
+RED = [f"(on r{number} binR)" for number in range(1, 6)]
+GREEN = [f"(on g{number} binL)" for number in range(1, 6)]
 ELEVEN = [f"(on b{number} right)" for number in range(1, 12)]
 
 
@@ -31,6 +34,12 @@ ELEVEN = [f"(on b{number} right)" for number in range(1, 12)]
         ("ungraspable_bystander", ["(on red right)"], 2),
         # Names of the usual sets of objects.
         ("ycb_name", ["(on 003_cracker_box right)"], 2),
+        # Every pair of parallel sides is a grasp, not the narrower one alone.
+        ("cube_blocked_along_y", ["(on target right)"], 2),
+        # Small bodies are held by the fingertips.
+        ("cubes_25mm", ["(on c1 c3)", "(on c2 c1)"], 4),
+        # The hand opens as far as the box asks, and goes between neighbours.
+        ("sorting_10", [*RED, *GREEN], 20),
         # More actions than the paper's limit of depth.
         ("twelve", ELEVEN, 22),
     ],
@@ -41,6 +50,15 @@ def test_the_default_planner_finds_a_plan(name: str, goals: list[str], least: in
     assert result.skeleton is not None, result.explanation
     assert satisfied(progress(scene.state, result.skeleton), parse_objective(goals))
     assert least <= len(result.skeleton) <= least + 2
+
+
+@pytest.mark.parametrize("quarters", [1, 2, 3])
+def test_a_cube_declared_at_another_yaw_of_its_symmetry_is_the_same(quarters: int) -> None:
+    scene = load_scene(CASES / "cube_blocked_along_y.json")
+    boxes = [box.model_copy(update={"yaw": quarters * math.pi / 2}) for box in scene.boxes]
+    turned = scene.model_copy(update={"boxes": tuple(boxes)})
+    result = plan(turned, "(on target right)", timeout=300)
+    assert len(result.skeleton or ()) == 2, result.explanation
 
 
 @pytest.mark.parametrize(

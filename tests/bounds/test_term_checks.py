@@ -5,6 +5,7 @@ import pytest
 
 from guided_lgp.bounds.checks import Top
 from guided_lgp.bounds.coarse.solver import default_solver
+from guided_lgp.bounds.program.geometry import GraspSide
 from guided_lgp.bounds.program.grasp import PALM_GAP, tool_targets
 from guided_lgp.bounds.program.inverse import reaches
 from guided_lgp.bounds.program.kernels import SCALE
@@ -39,13 +40,14 @@ def both_verdicts(verdicts: list[bool]) -> None:
 
 
 def held(gripper: str = "pr2L") -> HeldBox:
-    return HeldBox(gripper, "red", 0, 1, 2, 0.0, HALF_LENGTH, HALF_HEIGHT)
+    return HeldBox(gripper, "red", 0, 1, 2, GraspSide(0.0, HALF_LENGTH, SIZE[1]), HALF_HEIGHT, 0.0)
 
 
 @pytest.mark.parametrize("gripper", ROBOT.grippers)
 def test_hold(gripper: str) -> None:
     rng, verdicts = np.random.default_rng(0), []
     arm = kinematics_of(ROBOT).arms[gripper]
+    widest = arm.arm.fingers.grasp_width
     reach = reaches(kinematics_of(ROBOT), FIXED, default_solver(ROBOT).reach)[gripper]
     for _ in range(80):
         place = np.array([0.55, 0.2 * arm.side, rng.uniform(-1.5, 1.5), rng.uniform(0.5, 0.8)])
@@ -63,7 +65,7 @@ def test_hold(gripper: str) -> None:
         whole[arm.arm.slice] = arm.arm.signs * q
         tool = PLACED.tool_pose(whole, gripper).tolist()
         box = pose((place[0], place[1], place[3]), place[2]).tolist()
-        excess = hold.check(SIZE, box, tool, arm.chain.palm_front)
+        excess = hold.check(SIZE, box, tool, arm.chain.palm_front, widest)
         if np.abs(rows).max() < 1e-4:
             assert excess < 0
         if excess < 0:
@@ -170,23 +172,28 @@ def test_beside() -> None:
     both_verdicts(verdicts)
 
 
-def test_clear_and_apart() -> None:
+@pytest.mark.parametrize("opening", [0.09, 0.04])
+def test_clear_and_apart(opening: float) -> None:
     """A few spheres stand for the hulls: they agree as a rule, as they only guide the solver."""
     rng = np.random.default_rng(6)
     verdicts: dict[str, list[tuple[bool, bool]]] = {"clear_0": [], "apart_0_0": []}
     box = Box(name="red", size=(0.4, 0.4, 0.4), position=(0.6, 0.1, 0.9), on="tab")
     table = Table(name="tab", position=(0.6, 0.1, 0.7), half_extents=(0.2, 0.2))
     left, right = kinematics_of(ROBOT).arms.values()
+    hand = left.arm.fingers
+    closed = (hand.widest - opening) / 2
+    fingers = dict.fromkeys(ROBOT.grippers, hand.value(opening))
     mine = {*left.arm.links, *left.arm.hand_links}
     others = {*right.arm.links, *right.arm.hand_links}
     with World(Scene(tables=(table,), boxes=(box,))) as world:
         for _ in range(300):
             one, two = (rng.uniform(*np.array(arm.limits).T) for arm in (left, right))
-            world.set(np.concatenate([one, right.arm.signs * two]), {"red": pose(box.position)})
+            q = np.concatenate([one, right.arm.signs * two])
+            world.set(q, {"red": pose(box.position)}, fingers)
             x = np.array([*one, *box.position[:2], 0.0, box.position[2]])
-            clear = residual("clear_0", x, np.array([1.0, *FIXED, 0.0, 0.2, 0.2, 0.2, 0.0]))
+            clear = residual("clear_0", x, np.array([1.0, *FIXED, closed, 0.0, 0.2, 0.2, 0.2, 0.0]))
             both = np.concatenate([one, two])
-            apart = residual("apart_0_0", both, np.array([1.0, -1.0, *FIXED, 0.0]))
+            apart = residual("apart_0_0", both, np.array([1.0, -1.0, closed, closed, 0.0, *FIXED]))
             touching = [overlap.bodies for overlap in world.penetrations()]
             for kernel, rows, other in (("clear_0", clear, {"red"}), ("apart_0_0", apart, others)):
                 touch = any(bodies & mine and bodies & other for bodies in touching)

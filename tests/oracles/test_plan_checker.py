@@ -24,6 +24,7 @@ TASKS = {
     "tower": ("four_boxes_and_tray", "(on green red)", "(on red tray)"),
     "held": ("three_boxes", "(held green)"),
     "both_hands": ("three_boxes", "(held red)", "(on blue red)"),
+    "both_held": ("three_boxes", "(held blue)", "(held red)"),
 }
 
 
@@ -181,7 +182,7 @@ def test_actions_the_wrong_way_round_are_illegal(plans: dict[str, Any]) -> None:
 
 
 def test_actions_of_both_hands_swapped_contradict_the_attachments(plans: dict[str, Any]) -> None:
-    plan = plans["both_hands"]
+    plan = plans["both_held"]
     plan["actions"][:2] = reversed(plan["actions"][:2])
     assert kinds(check(plan)) == {"order"}
 

@@ -85,6 +85,13 @@ def axes_of(pose: Pose) -> tuple[Vector, Vector, Vector]:
     )
 
 
+def closing_axis(placement: Pose, tool: Pose) -> int:
+    """The axis of a box that is nearest to the one along which a hand's fingers close."""
+    _, closing, _ = axes_of(tool)
+    cosines = [abs(dot(closing, side)) for side in axes_of(placement)]
+    return cosines.index(max(cosines))
+
+
 def dot(first: Sequence[float], second: Sequence[float]) -> float:
     """Scalar product of two vectors (3,)."""
     return first[0] * second[0] + first[1] * second[1] + first[2] * second[2]

@@ -173,7 +173,7 @@ class _Execution:
         """Fix the box to the palm as they are; returns a fault if the gripper is not there."""
         tool, placement = self._tool(gripper), self._box(box)
         size, arm = box_sizes(self._world.scene)[box], self._robot.arms[gripper]
-        faults = grasp_faults(gripper, box, size, placement.tolist(), tool.tolist(), arm.palm_front)
+        faults = grasp_faults(arm, box, size, placement.tolist(), tool.tolist())
         if faults and faults[0].amount > GRASP_SLACK:
             return faults[0].constraint
         palm = self._world.links[arm.hand_links[0]]

@@ -13,6 +13,11 @@ from guided_lgp.robots.description import Description
 from guided_lgp.robots.document import FixedJoint, OffsetShoulderDocument
 from guided_lgp.robots.kinematics import Kinematics
 
+CLEARANCE = 0.01
+"""How far (m) fingers open beyond either side of what they take: motions keep 3 mm from everything,
+and a hand that is not quite where it should be touches nothing yet. Wider, they would need more
+room beside it: two rows of boxes 4.5 cm apart leave 1.7 cm around fingertips that hold one."""
+
 
 class Gap(Protocol):
     """How far two fingers are apart, over the value of their joints."""
@@ -71,6 +76,14 @@ class Fingers:
     def value(self, opening: float) -> float:
         """The value, within the limits, that opens the fingers so far (m)."""
         return float(np.clip(self.gap.value(opening), self.lower, self.upper))
+
+    def opening_for(self, width: float) -> float:
+        """How far (m) they open around a side of a width (m), as far as they can."""
+        return min(width + 2 * CLEARANCE, self.widest)
+
+    def value_around(self, width: float) -> float:
+        """The value at which they are open around a side of a width (m)."""
+        return self.value(self.opening_for(width))
 
     @cached_property
     def opened(self) -> float:

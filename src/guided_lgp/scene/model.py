@@ -174,9 +174,15 @@ class PlacedRobot(BaseModel):
         return document
 
 
-def grasp_axis(size: tuple[float, float, float]) -> int:
-    """The box axis that fingers close along: the narrower horizontal one (0: x, 1: y)."""
-    return 0 if size[0] < size[1] else 1
+def grasp_axes(size: tuple[float, float, float], widest: float) -> tuple[int, ...]:
+    """The box axes that fingers can close along, the narrower one first (0: x, 1: y).
+
+    Args:
+        size: extents (m) of the box.
+        widest: side (m) that the hand can take.
+    """
+    order = (0, 1) if size[0] < size[1] else (1, 0)
+    return tuple(axis for axis in order if size[axis] <= widest)
 
 
 class Table(Document):

@@ -160,6 +160,17 @@ class World:
                 self.boxes[name], placement[:3], placement[3:], physicsClientId=self.client
             )
 
+    def set_fingers(self, fingers: Mapping[str, float]) -> None:
+        """Put fingers to a value (rad or m), by gripper, without moving anything else."""
+        for gripper, value in fingers.items():
+            joints = self._description.arms[gripper].fingers
+            pybullet.resetJointStatesMultiDof(
+                self.robot,
+                [self.joints[joint] for joint in joints.joints],
+                [[ratio * value] for ratio in joints.ratios.tolist()],
+                physicsClientId=self.client,
+            )
+
     def penetrations(self, margin: float = MARGIN) -> list[Penetration]:
         """Pairs of bodies that overlap by more than ``margin`` (m), deepest first.
 

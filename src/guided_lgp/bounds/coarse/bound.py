@@ -28,6 +28,8 @@ class CoarseSolution(CoarseResult):
     """A coarse result that remembers where its solver stopped, to start longer skeletons."""
 
     values: Array | None = field(default=None, compare=False, repr=False)
+    sides: tuple[int, ...] = field(default=(), compare=False, repr=False)
+    """On which of the sides that fingers can close on each grip does."""
 
 
 class CoarseBound:
@@ -159,20 +161,23 @@ class CoarseBound:
     ) -> CoarseSolution:
         """One start: the first and every other one keep the solution of the prefix."""
         self._deadline.check()
-        formulation = programs[number]
-        warm_start = None if prefix is None else prefix.values
+        kept = prefix if number == 0 or number % 2 else None
+        generator = _generator(programs.skeleton, number)
+        sides = programs.sides(number, generator, () if kept is None else kept.sides)
+        formulation = programs.built(number, sides)
         start = self._starts.draw(
             formulation,
-            _generator(programs.skeleton, number),
+            generator,
             noise=0.0 if number == 0 else _NOISE,
-            warm_start=warm_start if number == 0 or number % 2 else None,
+            warm_start=None if kept is None else kept.values,
         )
         solution = self._solver.solve(formulation.program, start, self._settings)
-        kept = warm_start is not None and np.array_equal(
-            solution.values[: len(warm_start)], warm_start
-        )
-        verified = len(programs.skeleton) - 1 if kept else 0
-        return self._check(programs, formulation, solution, number + 1, verified)
+        verified = 0
+        if kept is not None and kept.values is not None:
+            same = np.array_equal(solution.values[: len(kept.values)], kept.values)
+            verified = len(programs.skeleton) - 1 if same else 0
+        result = self._check(programs, formulation, solution, number + 1, verified)
+        return replace(result, sides=sides)
 
     def _check(
         self,
@@ -217,22 +222,45 @@ _MARGINS = (
 
 
 class _Programs:
-    """The programs of a skeleton, one per set of margins, built when a start needs them."""
+    """The programs of a skeleton, by margins and sides, built when a start needs them."""
 
     def __init__(self, geometry: SceneGeometry, skeleton: Skeleton, goals: GoalTerms) -> None:
         self.skeleton = skeleton
         self.goals = goals
         self._geometry = geometry
-        self._built: dict[int, Formulation] = {}
+        self._choices = tuple(_choices(geometry, skeleton))
+        self._built: dict[tuple[int, tuple[int, ...]], Formulation] = {}
 
-    def __getitem__(self, number: int) -> Formulation:
+    def sides(
+        self, number: int, generator: np.random.Generator, kept: tuple[int, ...]
+    ) -> tuple[int, ...]:
+        """Where the grips close in a start: as in what is kept; new ones try one after the other.
+
+        Every other start keeps nothing and draws them.
+        """
+        if number and number % 2 == 0:
+            return tuple(int(generator.integers(n)) if n > 1 else 0 for n in self._choices)
+        turn = (number + 1) // 2
+        return kept + tuple(turn % count for count in self._choices[len(kept) :])
+
+    def built(self, number: int, sides: tuple[int, ...]) -> Formulation:
         """The program that a start solves."""
-        index = number % len(_MARGINS)
-        if index not in self._built:
-            terms = self.goals.lasting, self.goals.final
-            formulator = Formulator(self._geometry, _MARGINS[index], *terms)
-            self._built[index] = formulator.build(self.skeleton)
-        return self._built[index]
+        margins = number % len(_MARGINS)
+        if (margins, sides) not in self._built:
+            formulator = Formulator(
+                self._geometry, _MARGINS[margins], self.goals.lasting, self.goals.final, sides
+            )
+            self._built[margins, sides] = formulator.build(self.skeleton)
+        return self._built[margins, sides]
+
+
+def _choices(geometry: SceneGeometry, skeleton: Skeleton) -> Iterator[int]:
+    """On how many sides each grip of a skeleton can close; 1 where it is on none."""
+    arms = geometry.scene.robot.description.arms
+    for ground in map(geometry.domain.bind, skeleton):
+        if ground.parent in arms:
+            widest = arms[ground.parent].fingers.grasp_width
+            yield max(1, len(geometry.grasp_sides(ground.body, widest)))
 
 
 _PROVED = "proved for the arm alone, collisions left out"

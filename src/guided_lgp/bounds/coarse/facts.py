@@ -13,7 +13,7 @@ import numpy as np
 from guided_lgp.bounds.coarse.formulation import straight_lines
 from guided_lgp.bounds.coarse.reach import Grasp, Limb
 from guided_lgp.bounds.program.context import Line
-from guided_lgp.bounds.program.geometry import SceneGeometry
+from guided_lgp.bounds.program.geometry import GraspSide, SceneGeometry
 from guided_lgp.bounds.program.grasp import INSET, PALM_GAP
 from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.bounds.results import Array
@@ -59,7 +59,13 @@ class Facts:
         """Whether the arm cannot do it, collisions aside; boxes too wide for the fingers aside."""
         if hold not in self._known:
             limb = self._limbs[hold.gripper]
-            self._known[hold] = limb is not None and limb.cannot(self._grasp(hold))
+            widest = self._arms[hold.gripper].arm.fingers.grasp_width
+            sides = self._geometry.grasp_sides(hold.box, widest)
+            self._known[hold] = (
+                limb is not None
+                and bool(sides)
+                and all(limb.cannot(self._grasp(hold, side)) for side in sides)
+            )
         return self._known[hold]
 
     def never(self, ground: GroundInstruction) -> bool:
@@ -107,19 +113,18 @@ class Facts:
             state = successor(state, ground.action)
         return moved, bool(state.carried_by(body))
 
-    def _grasp(self, hold: Hold) -> Grasp:
-        """All grasps of the box there, with every value of the arm's first joint."""
-        turn, half_length, _ = self._geometry.grasp_side(hold.box)
+    def _grasp(self, hold: Hold, side: GraspSide) -> Grasp:
+        """All grasps of the box there on one side, with every value of the arm's first joint."""
         half_height = self._geometry.bodies[hold.box].half[2]
-        along, up = half_length - INSET, half_height - INSET
+        along, up = side.half_length - INSET, half_height - INSET
         low, high, height = self._region(hold)
         arm, limb = self._arms[hold.gripper], self._limbs[hold.gripper]
         assert limb is not None
         return Grasp(
-            low=np.array([*low[:2], low[2] + turn, 0.0, -along, -up, limb.limits[0, 0]]),
-            high=np.array([*high[:2], high[2] + turn, np.pi, along, up, limb.limits[0, 1]]),
+            low=np.array([*low[:2], low[2] + side.turn, 0.0, -along, -up, limb.limits[0, 0]]),
+            high=np.array([*high[:2], high[2] + side.turn, np.pi, along, up, limb.limits[0, 1]]),
             height=height,
-            half_length=half_length,
+            half_length=side.half_length,
             half_height=half_height,
             palm=arm.chain.palm_front + PALM_GAP,
             ends=((0.0, 0.0), *((line.back, line.up) for line in hold.lines)),

@@ -51,6 +51,7 @@ class Formulator:
         margins: Margins,
         lasting: Iterable[GroundTerm] = (),
         final: Sequence[GroundTerm] = (),
+        sides: Sequence[int] = (),
     ) -> None:
         """Begin a program.
 
@@ -59,10 +60,11 @@ class Formulator:
             margins: distances that it keeps.
             lasting: terms that hold all the time.
             final: terms that hold at the end.
+            sides: where each grip closes, see :class:`Context`.
         """
         robot = kinematics_of(geometry.scene.robot.description)
         self._domain = geometry.domain
-        self._context = Context(geometry, robot, kernel_table(robot), margins)
+        self._context = Context(geometry, robot, kernel_table(robot), margins, sides)
         self._final = final
         for term in lasting:
             self._add(term.name, *term.symbols, **term.options)

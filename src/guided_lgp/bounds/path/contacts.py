@@ -39,20 +39,30 @@ class ContactSampler:
         self._placements = PlacementSampler(task)
         self._foresight = Foresight(task, self._placements)
 
-    def contacts(self, index: int, situation: Situation) -> Iterator[Contacts]:
-        """A gripper takes the body where it is, another parent gets it put down on itself."""
-        if self._task.manoeuvres[index].parent in self._task.arms:
-            return self._grips(index, situation)
-        return self._places(index, situation)
+    def contacts(self, index: int, situation: Situation, width: float | None) -> Iterator[Contacts]:
+        """A gripper takes the body where it is, another parent gets it put down on itself.
 
-    def _grips(self, index: int, situation: Situation) -> Iterator[Contacts]:
-        """All ways to hold the body, for one strategy of its next action after the other."""
+        Args:
+            index: of the action.
+            situation: before the contact, the fingers open.
+            width: of the body between the fingers (m), if they close on it.
+        """
+        if width is None:
+            return self._places(index, situation)
+        return self._grips(index, situation, width)
+
+    def _grips(self, index: int, situation: Situation, width: float) -> Iterator[Contacts]:
+        """Ways to hold the body on sides so far apart, for one strategy of its next action after
+        the other.
+        """
         action = self._task.manoeuvres[index]
         body = action.body
-        central, others = self._task.grips[action.parent, body]
+        central, others = self._task.grips[action.parent, body][width]
+        if width == self._task.widths(index)[0]:
+            central += self._coarse_grip(index)
         box = situation.boxes(self._task.arms)[body]
-        for strategy, grips in product(STRATEGIES, (central + self._coarse_grip(index), others)):
-            outlook = self._foresight.outlook(index, situation, grips, strategy)
+        for strategy, grips in product(STRATEGIES, (central, others)):
+            outlook = self._foresight.outlook(index, situation, grips, width, strategy)
             if outlook is None:
                 continue
             rotation, position = grips.tools(box[:3], rotation_matrix(box[3:]))

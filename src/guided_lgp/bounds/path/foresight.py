@@ -36,9 +36,14 @@ class Foresight:
         self._placements = placements
 
     def outlook(
-        self, index: int, situation: Situation, grips: Grips, strategy: PlaceStrategy
+        self,
+        index: int,
+        situation: Situation,
+        grips: Grips,
+        width: float,
+        strategy: PlaceStrategy,
     ) -> Outlook | None:
-        """How grips of the body suit its next action, which follows a strategy.
+        """How grips of the body, so wide (m) there, suit its next action, by a strategy.
 
         None where the strategy adds nothing: nobody moves the body again, or hands take it.
         """
@@ -58,7 +63,9 @@ class Foresight:
         return Outlook(
             cost,
             cache(
-                lambda grip: self._possible(later, holder, expected, targets, reach, grips, grip)
+                lambda grip: self._possible(
+                    later, holder, expected, targets, reach, grips, width, grip
+                )
             ),
         )
 
@@ -93,7 +100,7 @@ class Foresight:
             if box not in away
         }
         closing = action.closing
-        opened = {} if closing is None else {closing: task.opened(closing)}
+        opened = {} if closing is None else {closing: task.opened(closing, task.widths(later)[0])}
         fingers = {**situation.fingers, **opened}
         return replace(
             situation,
@@ -112,6 +119,7 @@ class Foresight:
         targets: list[Place],
         reach: Reach,
         grips: Grips,
+        width: float,
         grip: int,
     ) -> bool:
         """Whether the body, held so, can be moved on somewhere without collisions."""
@@ -126,7 +134,7 @@ class Foresight:
             ends = reach.q[number, :, value, branch]
             if task.blocked(later, Stage.CONTACT, "at the contact", around, ends):
                 continue
-            left = self._left(later, expected, targets[number // count].pose)
+            left = self._left(later, expected, targets[number // count].pose, width)
             if self._can_leave(later, holder, left, reach, choice):
                 return True
         return False
@@ -144,13 +152,13 @@ class Foresight:
         }
         return {body: (holder, grasp), **riders}
 
-    def _left(self, later: int, expected: Situation, target: Array) -> Situation:
+    def _left(self, later: int, expected: Situation, target: Array, width: float) -> Situation:
         """When the body has been let go of, with what stands on it."""
         body, opening = self._task.manoeuvres[later].body, self._task.manoeuvres[later].opening
         coarse = self._task.contacts[later].boxes
         moved = compose(target, inverse(coarse[body]))
         riders = self._task.states[later].carried_by(body)
-        opened = [] if opening is None else [Fingers(opening, self._task.opened(opening))]
+        opened = [] if opening is None else [Fingers(opening, self._task.opened(opening, width))]
         return replace(
             self._task.after(expected, opened),
             standing={

@@ -1,4 +1,4 @@
-"""Ways to hold a box: fingers across its narrower side, approach between its two ends."""
+"""Ways to hold a box: fingers across one of its sides, approach between its two ends."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -10,7 +10,7 @@ from guided_lgp.bounds.program.grasp import INSET, PALM_GAP
 from guided_lgp.bounds.results import Array
 from guided_lgp.robots import Arm
 from guided_lgp.scene import Box
-from guided_lgp.scene.model import grasp_axis
+from guided_lgp.scene.model import grasp_axes
 
 _PITCHES = 8
 """Steps of the approach from one end of the box over the top to the other."""
@@ -45,10 +45,11 @@ class Grips:
         return rotation @ self.rotation, position + self.offset @ rotation.T
 
 
-def grips_of(box: Box, arm: Arm) -> tuple[Grips, Grips]:
-    """Grids over pitch × flip of the hand: the deep and centred grips, and all others.
+def grips_of(box: Box, arm: Arm) -> dict[float, tuple[Grips, Grips]]:
+    """The grips of a box, by its width (m) between the fingers.
 
-    Both are empty for a box that is too wide for the hand.
+    Grids over sides of the box, pitch and flip of the hand: the deep and centred grips, and all
+    others. Nothing for a box that is too wide for the hand.
     """
     return _grips(box.size, arm.palm_front, arm.fingers.grasp_width)
 
@@ -56,24 +57,25 @@ def grips_of(box: Box, arm: Arm) -> tuple[Grips, Grips]:
 @cache
 def _grips(
     size: tuple[float, float, float], palm_front: float, widest: float
-) -> tuple[Grips, Grips]:
-    half = np.array(size) / 2
-    across = grasp_axis(size)
-    along, closing = np.eye(3)[1 - across], np.eye(3)[across]
-    central: list[tuple[Array, Array]] = []
-    others: list[tuple[Array, Array]] = []
+) -> dict[float, tuple[Grips, Grips]]:
+    found: dict[float, tuple[list[_Frame], list[_Frame]]] = {}
     pitches = np.pi * np.arange(_PITCHES + 1) / _PITCHES
-    if 2 * half[across] > widest:
-        pitches = pitches[:0]
-    for pitch, shift in product(pitches, _SHIFTS):
+    for across, pitch, shift in product(grasp_axes(size, widest), pitches, _SHIFTS):
+        central, others = found.setdefault(size[across], ([], []))
+        along, closing = np.eye(3)[1 - across], np.eye(3)[across]
         approach = np.cos(pitch) * along - np.sin(pitch) * np.array([0.0, 0.0, 1.0])
         third = np.cross(approach, closing)
+        half = np.array(size) / 2
         for number, reach in enumerate(_reaches(half, palm_front, approach, shift * third)):
             offset = shift * third - reach * approach
             for flip in (1.0, -1.0):
-                grip = np.stack([approach, flip * closing, flip * third], axis=1), offset
-                (others if shift or number else central).append(grip)
-    return _stacked(central), _stacked(others)
+                frame = np.stack([approach, flip * closing, flip * third], axis=1), offset
+                (others if shift or number else central).append(frame)
+    return {width: (_stacked(one), _stacked(other)) for width, (one, other) in found.items()}
+
+
+_Frame = tuple[Array, Array]
+"""Rotation and origin of the tool frame in the box's."""
 
 
 def _reaches(half: Array, palm_front: float, approach: Array, shift: Array) -> Array:

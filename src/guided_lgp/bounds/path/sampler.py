@@ -40,17 +40,19 @@ class OutcomeSampler:
         self.visits += 1
         action = self._task.manoeuvres[index]
         others = [gripper for gripper in self._task.arms if gripper != action.gripper]
-        for steps, presented in self._presented(index, situation, action.presented):
-            opening = self._opening(presented, action.closing)
-            opened = self._task.after(presented, opening)
-            for outcome in islice(self._carried_out(index, opened), _OUTCOMES):
-                rest = self._home(index, Stage.ASIDE, outcome.situation, others)
-                if rest is not None:
-                    yield Outcome(
-                        (*steps, *opening, *outcome.steps, *rest),
-                        self._task.after(outcome.situation, rest),
-                        outcome.contact,
-                    )
+        widths = [None] if action.closing is None else self._task.widths(index)
+        for steps, there in self._presented(index, situation, action.presented):
+            for width in widths:
+                opening = self._opening(there, action.closing, width)
+                opened = self._task.after(there, opening)
+                for outcome in islice(self._carried_out(index, opened, width), _OUTCOMES):
+                    rest = self._home(index, Stage.ASIDE, outcome.situation, others)
+                    if rest is not None:
+                        yield Outcome(
+                            (*steps, *opening, *outcome.steps, *rest),
+                            self._task.after(outcome.situation, rest),
+                            outcome.contact,
+                        )
 
     def backjump_target(self, index: int) -> int:
         """The earlier action to change when none of the ways of this one works.
@@ -112,17 +114,22 @@ class OutcomeSampler:
                 continue
             yield tuple(steps), task.after(situation, steps)
 
-    def _opening(self, situation: Situation, gripper: str | None) -> tuple[Step, ...]:
-        """Fingers that are to close open before."""
-        if gripper is None or situation.fingers[gripper] == self._task.opened(gripper):
+    def _opening(
+        self, situation: Situation, gripper: str | None, width: float | None
+    ) -> tuple[Step, ...]:
+        """Fingers that are to close open before, around a width (m)."""
+        if gripper is None or width is None:
             return ()
-        return (Fingers(gripper, self._task.opened(gripper)),)
+        opened = self._task.opened(gripper, width)
+        return () if situation.fingers[gripper] == opened else (Fingers(gripper, opened),)
 
-    def _carried_out(self, index: int, situation: Situation) -> Iterator[Outcome]:
+    def _carried_out(
+        self, index: int, situation: Situation, width: float | None
+    ) -> Iterator[Outcome]:
         """Carry out an action at the likeliest contacts that are within reach."""
         task = self._task
         gripper = task.manoeuvres[index].gripper
-        for contacts in self._contacts.contacts(index, situation):
+        for contacts in self._contacts.contacts(index, situation, width):
             reach = task.reach(
                 index, task.arms[gripper], contacts.rotation, contacts.position, contacts.way
             )
@@ -214,16 +221,18 @@ class OutcomeSampler:
         bodies = (action.body, *situation.state.carried_by(action.body))
         carrier = task.carrier(index + 1, action.body)
         steps: list[Step] = []
+        boxes = situation.boxes(task.arms)
         if action.closing is not None:
-            fingers = task.arms[action.closing].arm.fingers
-            closed = fingers.value(min(task.boxes[action.body].size[:2]))
+            width = task.width(action.closing, action.body, situation.q, boxes)
+            closed = task.arms[action.closing].arm.fingers.value(width)
             steps.append(Fingers(action.closing, closed))
         if action.body in situation.carried:
             steps.append(Release(bodies))
         if carrier is not None:
             steps.append(Attach(bodies, carrier))
         if action.opening is not None:
-            steps.append(Fingers(action.opening, task.opened(action.opening)))
+            width = task.width(action.opening, action.body, situation.q, boxes)
+            steps.append(Fingers(action.opening, task.opened(action.opening, width)))
         return tuple(steps)
 
     def _home(

@@ -6,10 +6,11 @@ from enum import IntEnum
 
 import numpy as np
 
+from guided_lgp.bounds.checks import closing_axis
 from guided_lgp.bounds.goals import GoalTerms
 from guided_lgp.bounds.path.grips import Grips
 from guided_lgp.bounds.path.motions import Motion, Mover, Surroundings, Tool, Transit
-from guided_lgp.bounds.path.situation import Situation, Step
+from guided_lgp.bounds.path.situation import Situation, Step, tool_pose
 from guided_lgp.bounds.path.steps import manoeuvre
 from guided_lgp.bounds.results import Array, Keyframe
 from guided_lgp.logic import Skeleton, successor
@@ -109,7 +110,7 @@ class Task:
         self,
         scene: Scene,
         mover: Mover,
-        grips: Mapping[tuple[str, str], tuple[Grips, Grips]],
+        grips: Mapping[tuple[str, str], Mapping[float, tuple[Grips, Grips]]],
         skeleton: Skeleton,
         contacts: Sequence[Keyframe],
         failure: FurthestFailure,
@@ -228,9 +229,23 @@ class Task:
             return np.array(self.tables[body].half_extents)
         return np.array(self.boxes[body].size[:2]) / 2
 
-    def opened(self, gripper: str) -> float:
-        """The value of a gripper's fingers at which they are wide open."""
-        return self.arms[gripper].arm.fingers.opened
+    def width(self, gripper: str, body: str, q: Array, boxes: Mapping[str, Array]) -> float:
+        """Width (m) of a body between the fingers of a gripper at a configuration (n,)."""
+        tool = tool_pose(self.arms[gripper], q).tolist()
+        across = closing_axis(boxes[body].tolist(), tool)
+        return self.boxes[body].size[across]
+
+    def widths(self, index: int) -> list[float]:
+        """Widths (m) on which fingers can close on the body of an action, the coarse one first."""
+        action, contact = self.manoeuvres[index], self.contacts[index]
+        assert action.closing is not None
+        coarse = self.width(action.closing, action.body, contact.q, contact.boxes)
+        grips = self.grips[action.closing, action.body]
+        return sorted(grips, key=lambda width: (width != coarse, width))
+
+    def opened(self, gripper: str, width: float) -> float:
+        """The value of a gripper's fingers at which they are open around a width (m)."""
+        return self.arms[gripper].arm.fingers.value_around(width)
 
     def record(self, index: int, stage: Stage, constraint: str) -> None:
         """Remember an obstacle of an action."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from guided_lgp.bounds.program.arrays import ProgramBuilder
 from guided_lgp.bounds.program.draft import Draft
-from guided_lgp.bounds.program.geometry import Margins, SceneGeometry
+from guided_lgp.bounds.program.geometry import GraspSide, Margins, SceneGeometry
 from guided_lgp.bounds.program.kernels import KernelTable
 from guided_lgp.bounds.program.kinematics import ArmKinematics, RobotKinematics
 from guided_lgp.bounds.program.slots import (
@@ -51,8 +51,20 @@ class Context:
         robot: RobotKinematics,
         table: KernelTable,
         margins: Margins,
+        sides: Sequence[int] = (),
     ) -> None:
+        """Begin before the first action.
+
+        Args:
+            geometry: of the scene.
+            robot: its arms.
+            table: the kernels.
+            margins: distances to keep.
+            sides: on which of the sides that it can close on each grip does, in order; else the
+                first.
+        """
         self.geometry = geometry
+        self._sides = sides
         self.robot = robot
         self.margins = margins
         self.program = ProgramBuilder(table)
@@ -155,6 +167,16 @@ class Context:
     def half(self, name: str) -> tuple[float, float, float]:
         """Half extents (m) of a body."""
         return self.geometry.bodies[name].half
+
+    def next_side(self, sides: Sequence[GraspSide]) -> GraspSide:
+        """Of the sides on which fingers can close, the one of the next grip."""
+        number = len(self.grips)
+        return sides[self._sides[number] if number < len(self._sides) else 0]
+
+    def closed(self, gripper: str) -> float:
+        """How far (m) each finger of a hand is from where it is when the hand is wide open."""
+        held = self.hands.get(gripper)
+        return 0.0 if held is None else held.closed
 
     def joints(self, gripper: str) -> tuple[int, ...]:
         """Where an arm is while it does not act."""

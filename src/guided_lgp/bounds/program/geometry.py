@@ -9,7 +9,7 @@ import numpy as np
 from guided_lgp.bounds.results import Array
 from guided_lgp.poses import inverse, yaw_of
 from guided_lgp.scene import Scene
-from guided_lgp.scene.model import grasp_axis
+from guided_lgp.scene.model import grasp_axes
 from guided_lgp.scene.world import TABLE_THICKNESS
 
 
@@ -34,6 +34,17 @@ class Body:
     name: str
     half: tuple[float, float, float]
     mass: float
+
+
+@dataclass(frozen=True)
+class GraspSide:
+    """A pair of upright sides of a box that fingers close on."""
+
+    turn: float
+    """Of their length against the box's x axis (rad)."""
+    half_length: float
+    width: float
+    """From one to the other (m)."""
 
 
 class SceneGeometry:
@@ -86,9 +97,8 @@ class SceneGeometry:
         position = (base_x + cosine * x - sine * y, base_y + sine * x + cosine * y, height)
         return np.array([*position, 0.0, 0.0, math.sin(half), math.cos(half)])
 
-    def grasp_side(self, name: str) -> tuple[float, float, float]:
-        """How the fingers close on a box: turn of its length against x, half length, width."""
+    def grasp_sides(self, name: str, widest: float) -> tuple[GraspSide, ...]:
+        """The sides of a box that fingers, open up to ``widest`` (m), can close on."""
         hx, hy, hz = self.bodies[name].half
-        if grasp_axis((2 * hx, 2 * hy, 2 * hz)) == 1:
-            return 0.0, hx, 2 * hy
-        return np.pi / 2, hy, 2 * hx
+        sides = GraspSide(np.pi / 2, hy, 2 * hx), GraspSide(0.0, hx, 2 * hy)
+        return tuple(sides[axis] for axis in grasp_axes((2 * hx, 2 * hy, 2 * hz), widest))

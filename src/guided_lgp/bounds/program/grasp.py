@@ -71,14 +71,14 @@ def tool_targets(
     Returns:
         rotation (N, M, 1, 3, 3) and position (N, M, E, 3) of the tool.
     """
-    heading = (poses[:, 2] + held.turn)[:, None]
+    heading = (poses[:, 2] + held.side.turn)[:, None]
     ch, sh, cp, sp = np.cos(heading), np.sin(heading), np.cos(pitches), np.sin(pitches)
     zero = np.zeros(np.broadcast_shapes(ch.shape, cp.shape))
     x_axis = np.stack([ch * cp, sh * cp, zero - sp], axis=-1)
     y_axis = np.stack([zero - sh, zero + ch, zero], axis=-1)
     z_axis = np.stack([ch * sp, sh * sp, zero + cp], axis=-1)
     offset, depth = hand
-    reach = held.half_length * np.abs(cp) + held.half_height * sp + palm_front + depth
+    reach = held.side.half_length * np.abs(cp) + held.half_height * sp + palm_front + depth
     contact = poses[:, None, [0, 1, 3]] - reach[:, None] * x_axis - offset * z_axis
     position = contact[:, :, None] - ends[:, :1] * x_axis[:, :, None]
     position[..., 2] += ends[:, 1]
@@ -88,7 +88,7 @@ def tool_targets(
 def in_tool(held: HeldBox, values: Array, palm_front: float) -> Array:
     """Pose (7,) of a held box in the tool frame of its gripper."""
     pitch, offset, depth = values[list(held.grip)]
-    reach = held.half_length * abs(np.cos(pitch)) + held.half_height * np.sin(pitch)
+    reach = held.side.half_length * abs(np.cos(pitch)) + held.half_height * np.sin(pitch)
     level = np.array([0.0, -np.sin(pitch / 2), 0.0, np.cos(pitch / 2)])
-    turned = multiply(level, pose((0, 0, 0), -held.turn)[3:])
+    turned = multiply(level, pose((0, 0, 0), -held.side.turn)[3:])
     return np.array([reach + palm_front + depth, 0.0, offset, *turned])

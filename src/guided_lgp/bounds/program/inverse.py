@@ -75,7 +75,8 @@ class ClosedForm:
         arguments[..., 9] = self._arm.side
         arguments[..., 10] = self._lifted
         arguments[..., 11] = ends[:, 1, None]
-        arguments[..., 12:15] = held.half_length, held.half_height, held.turn
+        side = held.side
+        arguments[..., 12:15] = side.half_length, held.half_height, side.turn
         arguments[..., 15] = ends[:, 0, None]
         found = self._evaluate(self._arm.chain.name, arguments.reshape(-1, INPUTS))
         solutions = found.reshape(*shape, -1)

@@ -52,14 +52,16 @@ class Chain:
     palm_front: float
     """x of the palm's front in the tool frame (m)."""
 
-    def pose(self, q: Any, side: Any, fixed: Any) -> ArmPose:
+    def pose(self, q: Any, side: Any, fixed: Any, closed: Any = 0) -> ArmPose:
         """Forward kinematics.
 
         Args:
             q: values of the moving joints (rad), mirrored for a mirror image.
             side: 1, or -1 for the mirror image.
             fixed: values of the joints that the scene sets (rad, m).
+            closed: how far (m) the fingers, and their spheres, are from wide open.
         """
+        inwards = self._inwards()
         value = {name: q[i] for i, name in enumerate(self.moving)}
         value |= {name: fixed[i] for i, name in enumerate(self.fixed)}
         rotation, position = ca.SX.eye(3), ca.SX.zeros(3)
@@ -73,7 +75,8 @@ class Chain:
                 rotation = ca.mtimes(rotation, turned(joint.axis, value[joint.name]))
             for i, sphere in enumerate(self.spheres):
                 if sphere.link == joint.child:
-                    centres[i] = position + ca.mtimes(rotation, _exact(np.array(sphere.centre)))
+                    centre = _exact(np.array(sphere.centre)) + closed * _exact(inwards[i])
+                    centres[i] = position + ca.mtimes(rotation, centre)
         position = position + ca.mtimes(rotation, _exact(self.tool[1]))
         rotation = ca.mtimes(rotation, _exact(self.tool[0]))
         mirror = ca.diag(ca.vertcat(1, side, 1))
@@ -83,6 +86,33 @@ class Chain:
             rotation=ca.mtimes([mirror, rotation, mirror]),
             spheres=ca.mtimes(mirror, spheres),
         )
+
+    def _inwards(self) -> list[Array]:
+        """For each sphere, the way (3,) in its link that it goes where fingers close.
+
+        Spheres on one side of the plane between the fingers, on what is fixed to the hand, are
+        theirs; all others stay where they are.
+        """
+        tools = self._tools()
+        ways = []
+        for sphere in self.spheres:
+            rotation, position = tools.get(sphere.link, (np.zeros((3, 3)), np.zeros(3)))
+            closing = rotation[:, 1]
+            across = float((np.array(sphere.centre) - position) @ closing)
+            ways.append(-np.sign(across) * closing if abs(across) > sphere.radius else 0 * closing)
+        return ways
+
+    def _tools(self) -> dict[str, tuple[Array, Array]]:
+        """Rotation (3, 3) and position (3,) of the tool frame in every link that is fixed to it."""
+        rotation, position = self.tool
+        tools = {}
+        for joint in reversed(self.joints):
+            tools[joint.child] = rotation, position
+            if joint.name in (*self.moving, *self.fixed):
+                break
+            position = joint.position + joint.rotation @ position
+            rotation = joint.rotation @ rotation
+        return tools
 
 
 @dataclass(frozen=True, eq=False)

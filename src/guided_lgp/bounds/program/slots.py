@@ -5,6 +5,8 @@ Slots of constants are negative until the number of variables is known.
 
 from dataclasses import dataclass, field, replace
 
+from guided_lgp.bounds.program.geometry import GraspSide
+
 ZERO = -1
 """Slot of the constant 0."""
 
@@ -65,10 +67,11 @@ class HeldBox:
     pitch: int
     offset: int
     depth: int
-    turn: float
-    """Of the box's length against its x axis (rad)."""
-    half_length: float
+    side: GraspSide
+    """On which the fingers close."""
     half_height: float
+    closed: float
+    """How far (m) each finger is from wide open while the hand comes and leaves."""
     configurations: list[ArmConfiguration] = field(default_factory=list)
 
     @property

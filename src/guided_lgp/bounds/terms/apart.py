@@ -12,9 +12,10 @@ from guided_lgp.bounds.terms.term import Term
 
 def _kernel(one: Chain, other: Chain, fixed: int) -> Kernel:
     n, m = len(one.moving), len(other.moving)
-    x, p = ca.SX.sym("x", n + m), ca.SX.sym("p", 3 + fixed)
-    scene, margin = p[2 : 2 + fixed], p[2 + fixed]
-    first, second = one.pose(x[:n], p[0], scene), other.pose(x[n:], p[1], scene)
+    x, p = ca.SX.sym("x", n + m), ca.SX.sym("p", 5 + fixed)
+    sides, closed, margin, scene = p[:2], p[2:4], p[4], p[5 : 5 + fixed]
+    first = one.pose(x[:n], sides[0], scene, closed[0])
+    second = other.pose(x[n:], sides[1], scene, closed[1])
     rows = [
         distance(first.spheres[:, i] - second.spheres[:, j])
         - one.spheres[i].radius
@@ -43,7 +44,12 @@ def keep_apart(
     context.rows(
         f"apart_{one.chain.name}_{two.chain.name}",
         (*joints, *others_joints),
-        (one.side, two.side, *context.fixed, context.margins.apart),
+        (
+            *(one.side, two.side),
+            *(context.closed(gripper), context.closed(other)),
+            context.margins.apart,
+            *context.fixed,
+        ),
         ("apart", gripper, other),
         tuple(one.links[i] for i in one.chain.against_arms for _ in range(count)),
     )

@@ -10,11 +10,12 @@ from guided_lgp.bounds.terms.term import Term
 
 def _kernel(chain: Chain, fixed: int) -> Kernel:
     n = len(chain.moving)
-    x, p = ca.SX.sym("x", n + 4), ca.SX.sym("p", 6 + fixed)
+    x, p = ca.SX.sym("x", n + 4), ca.SX.sym("p", 7 + fixed)
     q, pose, z = x[:n], x[n : n + 3], x[n + 3]
     side, scene = p[0], p[1 : 1 + fixed]
-    z_offset, half, margin = p[1 + fixed], p[2 + fixed : 5 + fixed], p[5 + fixed]
-    arm = chain.pose(q, side, scene)
+    closed, z_offset = p[1 + fixed], p[2 + fixed]
+    half, margin = p[3 + fixed : 6 + fixed], p[6 + fixed]
+    arm = chain.pose(q, side, scene, closed)
     rows = []
     for i, sphere in enumerate(chain.spheres):
         d = arm.spheres[:, i] - ca.vertcat(pose[0], pose[1], z + z_offset)
@@ -34,7 +35,13 @@ def keep_clear(context: Context, gripper: str, joints: tuple[int, ...], body: st
     context.rows(
         f"clear_{arm.chain.name}",
         (*joints, *pose.plane, pose.z),
-        (*context.arm_parameters(arm), pose.offset, *context.half(body), context.margins.clear),
+        (
+            *context.arm_parameters(arm),
+            context.closed(gripper),
+            pose.offset,
+            *context.half(body),
+            context.margins.clear,
+        ),
         ("clear", gripper, body),
         arm.links,
     )

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 import casadi as ca
 import numpy as np
 
-from guided_lgp.bounds.checks import Pose, Vector, angle_of, axes_of, dot, offset_of
+from guided_lgp.bounds.checks import Pose, Vector, angle_of, axes_of, closing_axis, dot, offset_of
 from guided_lgp.bounds.program.context import Context, Line
 from guided_lgp.bounds.program.draft import Draft
 from guided_lgp.bounds.program.grasp import INSET, PALM_GAP, tool_target
@@ -24,7 +24,6 @@ from guided_lgp.bounds.program.slots import (
 )
 from guided_lgp.bounds.results import Array
 from guided_lgp.bounds.terms.term import Term, UngraspableError
-from guided_lgp.scene.model import grasp_axis
 from guided_lgp.scene.tolerances import MARGIN
 
 GRASP_OFFSET = 0.003
@@ -88,22 +87,24 @@ def grip(context: Context, gripper: str, box: str) -> HeldBox:
 
 
 def _new_grip(context: Context, gripper: str, box: str) -> HeldBox:
-    turn, along, width = context.geometry.grasp_side(box)
     arm = context.robot.arms[gripper].arm
-    if width > arm.fingers.grasp_width:
-        raise UngraspableError(context.action, box, width - arm.fingers.grasp_width)
+    sides = context.geometry.grasp_sides(box, arm.fingers.grasp_width)
+    if not sides:
+        excess = 2 * min(context.half(box)[:2]) - arm.fingers.grasp_width
+        raise UngraspableError(context.action, box, excess)
+    side = context.next_side(sides)
     height = context.half(box)[2]
-    slide = max(along, height) - INSET
-    deepest = max(PALM_GAP, INSET - arm.palm_front - 2 * min(along, height))
+    slide = max(side.half_length, height) - INSET
+    deepest = max(PALM_GAP, INSET - arm.palm_front - 2 * min(side.half_length, height))
     return HeldBox(
         gripper,
         box,
         pitch=context.program.variable(0.0, np.pi, 1e-3, np.pi / 2),
         offset=context.program.variable(-slide, slide, 0.05, 0.0),
         depth=context.program.variable(PALM_GAP, max(deepest, -arm.palm_front), 0.05, deepest),
-        turn=turn,
-        half_length=along,
+        side=side,
         half_height=height,
+        closed=(arm.fingers.widest - arm.fingers.opening_for(side.width)) / 2,
     )
 
 
@@ -148,7 +149,7 @@ def _rows(
     up: float,
 ) -> None:
     arm = context.robot.arms[held.gripper]
-    grasp = (held.half_length, held.half_height, held.turn, back)
+    grasp = (held.side.half_length, held.half_height, held.side.turn, back)
     context.rows(
         f"hold_{arm.chain.name}",
         (*joints, *held.grip, *pose.plane, pose.z),
@@ -241,27 +242,30 @@ _SHOULDER_JOINTS = 4
 # check
 
 
-def check(size: Vector, placement: Pose, tool: Pose, palm_front: float) -> float:
+def check(size: Vector, placement: Pose, tool: Pose, palm_front: float, widest: float) -> float:
     """By how much (m or rad) a hand is not where it holds a box: negative where it is.
 
-    The fingers close across the box's narrower side, the box is in the middle between them, and
-    the palm is outside of it.
+    The fingers close on two sides of the box that are not too far apart, the box is in the middle
+    between them, and the palm is outside of it.
 
     Args:
         size: extents (m) of the box.
         placement: its pose.
         tool: pose of the gripper's tool frame.
         palm_front: x of the palm's front in the tool frame (m).
+        widest: side (m) that the hand can take.
     """
     approach, closing, _ = axes_of(tool)
     sides, offset = axes_of(placement), offset_of(tool, placement)
     reach = dot(offset, approach)
     for axis in range(3):
         reach -= size[axis] / 2 * abs(dot(approach, sides[axis]))
+    across = closing_axis(placement, tool)
     return max(
-        angle_of(abs(dot(closing, sides[grasp_axis(size)]))) - GRASP_ANGLE,
+        angle_of(abs(dot(closing, sides[across]))) - GRASP_ANGLE,
         abs(dot(offset, closing)) - GRASP_OFFSET,
         palm_front - MARGIN - reach,
+        size[across] - widest,
     )
 
 

@@ -2,14 +2,13 @@
 
 import casadi as ca
 
-from guided_lgp.bounds.checks import Pose, Vector, axes_of, dot, offset_of
+from guided_lgp.bounds.checks import Pose, Vector, axes_of, closing_axis, dot, offset_of
 from guided_lgp.bounds.program.context import Context
 from guided_lgp.bounds.program.grasp import INSET, tool_target
 from guided_lgp.bounds.program.kernels import SCALE, Kernel, kernel
 from guided_lgp.bounds.program.kinematics import Chain, RobotKinematics
 from guided_lgp.bounds.terms.hold import grip
 from guided_lgp.bounds.terms.term import Term
-from guided_lgp.scene.model import grasp_axis
 
 TOLERANCE = 0.001
 """By how much (m) a grasp that is looked at may be off that rule."""
@@ -39,7 +38,7 @@ def _add(context: Context, gripper: str, box: str) -> None:
     context.rows(
         f"pads_{context.robot.arms[gripper].chain.name}",
         held.grip,
-        (held.half_length, held.half_height),
+        (held.side.half_length, held.half_height),
         ("pads", gripper, box),
     )
 
@@ -53,7 +52,7 @@ def check(size: Vector, placement: Pose, tool: Pose) -> float:
         tool: pose of the gripper's tool frame.
     """
     sides, offset = axes_of(placement), offset_of(tool, placement)
-    along = (axis for axis in range(3) if axis != grasp_axis(size))
+    along = (axis for axis in range(3) if axis != closing_axis(placement, tool))
     outside = (abs(dot(offset, sides[axis])) - size[axis] / 2 for axis in along)
     return max(outside) + INSET - TOLERANCE
 

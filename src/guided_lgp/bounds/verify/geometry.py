@@ -5,7 +5,7 @@ from collections.abc import Collection, Mapping
 
 from guided_lgp.bounds.checks import Pose, Vector, Violation, box_sizes, top_of
 from guided_lgp.bounds.terms import balanced, hold, pads, stand
-from guided_lgp.robots import Robot
+from guided_lgp.robots import Arm, Robot
 from guided_lgp.scene import Scene
 from guided_lgp.scene.tolerances import BALANCE_INSET
 from guided_lgp.scene.world import Penetration, initial_poses
@@ -18,27 +18,24 @@ _SAME = 1e-6
 """Distance (m) of places that are one, but for rounding."""
 
 
-def grasp_faults(
-    gripper: str, box: str, size: Vector, placement: Pose, tool: Pose, palm_front: float
-) -> list[Violation]:
+def grasp_faults(arm: Arm, box: str, size: Vector, placement: Pose, tool: Pose) -> list[Violation]:
     """Whether the gripper holds the box: closing across it, fingertips on it, palm outside.
 
     Args:
-        gripper: its name.
+        arm: of the gripper.
         box: its name.
         size: its extents (m).
         placement: its pose.
         tool: pose of the gripper's tool frame.
-        palm_front: x of the palm's front in the tool frame (m).
 
     Returns:
         The greater violation first.
     """
     excess = {
-        "hold": hold.check(size, placement, tool, palm_front),
+        "hold": hold.check(size, placement, tool, arm.palm_front, arm.fingers.grasp_width),
         "pads": pads.check(size, placement, tool),
     }
-    found = [Violation(f"{term} {gripper} {box}", e) for term, e in excess.items() if e > 0]
+    found = [Violation(f"{term} {arm.gripper} {box}", e) for term, e in excess.items() if e > 0]
     return sorted(found, key=lambda violation: -violation.amount)
 
 

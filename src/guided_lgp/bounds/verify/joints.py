@@ -4,13 +4,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from guided_lgp.bounds.checks import Violation, box_sizes
-from guided_lgp.bounds.results import Array
-from guided_lgp.bounds.verify.attachments import spans
+from guided_lgp.bounds.checks import Violation, box_sizes, closing_axis
+from guided_lgp.bounds.results import Array, Attachment
+from guided_lgp.bounds.verify.attachments import carriers, spans
 from guided_lgp.bounds.verify.keyframes import LIMIT_TOLERANCE
 from guided_lgp.logic import Skeleton
+from guided_lgp.poses import compose, inverse
 from guided_lgp.robots import Arm, Robot
 from guided_lgp.scene import Scene
+from guided_lgp.scene.world import initial_poses
 
 RATE_TOLERANCE = 1.02
 """Factor on velocity and acceleration limits, for finite differences."""
@@ -54,7 +56,7 @@ def finger_faults(
     scene: Scene, skeleton: Skeleton, switches: Sequence[int], q: Array, times: Array
 ) -> Violation | None:
     """Fingers of one hand that are not parallel, or not closed on the box they carry."""
-    sizes, arms = box_sizes(scene), scene.robot.description.arms
+    arms, widths = scene.robot.description.arms, _widths(scene, skeleton, switches, q)
     holds = list(spans(scene.state, skeleton, switches, len(q), lambda state: dict(state.held)))
     for gripper, arm in arms.items():
         if not arm.fingers.joints:
@@ -67,12 +69,26 @@ def finger_faults(
         held = (span for span in holds if span.gripper == gripper)
         for span in sorted(held, key=lambda span: span.start):
             rows = slice(span.start, span.end + 1)
-            width = min(sizes[span.box][:2])
-            play = _play(arm, width, q[rows, arm.slice], fingers[rows, 0])
+            play = _play(arm, widths[span], q[rows, arm.slice], fingers[rows, 0])
             if play.max() > 0:
                 time = float(times[span.start + np.argmax(play)])
                 return Violation(f"fingers {gripper}", float(play.max()), time=time)
     return None
+
+
+def _widths(
+    scene: Scene, skeleton: Skeleton, switches: Sequence[int], q: Array
+) -> dict[Attachment, float]:
+    """Width (m) of what each gripper closes on, for every span in which it carries a box."""
+    sizes, boxes, widths = box_sizes(scene), initial_poses(scene), {}
+    arms = q[:, : len(scene.robot.description.joint_names)]
+    carried = spans(scene.state, skeleton, switches, len(q), carriers)
+    for span in sorted(carried, key=lambda span: span.start):
+        start, end = scene.robot.tool_poses(arms[[span.start, span.end]])[span.gripper]
+        across = closing_axis(boxes[span.box].tolist(), start.tolist())
+        widths[span] = sizes[span.box][across]
+        boxes[span.box] = compose(end, compose(inverse(start), boxes[span.box]))
+    return widths
 
 
 def _play(arm: Arm, width: float, q: Array, fingers: Array) -> Array:

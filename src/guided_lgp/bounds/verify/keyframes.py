@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from guided_lgp.bounds.checks import Violation, body_names, box_sizes, overlap_name
+from guided_lgp.bounds.checks import Violation, body_names, box_sizes, closing_axis, overlap_name
 from guided_lgp.bounds.results import Array, Keyframe
 from guided_lgp.bounds.terms import carried
 from guided_lgp.bounds.terms.carried import Relative, relative
@@ -27,8 +27,8 @@ def verify_keyframe(
         keyframe: arms and boxes.
         state: who holds what and what stands where; with an action, before it.
         action: for a contact keyframe, the action whose switch it is: the box is where it
-            changes over. Hands that close or open then are checked open, as they are shortly
-            before a grasp and after a place.
+            changes over. Hands that close or open then are checked open around the box, as they
+            are shortly before a grasp and after a place.
 
     Returns:
         What is violated; nothing if the keyframe is good.
@@ -41,17 +41,16 @@ def verify_keyframe(
     if not math.isfinite(sum(map(sum, boxes.values()))):
         return [Violation("finite pose", math.nan)]
     violations = joint_limit_faults(robot, keyframe.q)
-    fingers = {
-        gripper: robot.arms[gripper].fingers.value(min(sizes[box][:2]))
-        for box, gripper in held
-        if (box, gripper) in state.held and (box, gripper) in after.held
-    }
-    world.set(keyframe.q, keyframe.boxes, fingers)
+    world.set(keyframe.q, keyframe.boxes)
     if held:
         tools = world.tool_poses(gripper for _, gripper in held).tolist()
         for (box, gripper), tool in zip(held, tools, strict=True):
-            palm_front = robot.arms[gripper].palm_front
-            violations += grasp_faults(gripper, box, sizes[box], boxes[box], tool, palm_front)
+            arm = robot.arms[gripper]
+            width = sizes[box][closing_axis(boxes[box], tool)]
+            keeps = (box, gripper) in state.held and (box, gripper) in after.held
+            value = arm.fingers.value if keeps else arm.fingers.value_around
+            world.set_fingers({gripper: value(width)})
+            violations += grasp_faults(arm, box, sizes[box], boxes[box], tool)
     violations += placement_faults(world.scene, boxes, support)
     bodies = body_names(world.scene)
     violations += [

@@ -160,7 +160,7 @@ def _contact_fault(phase: Phase, after: State) -> Violation | None:
         fault
         for box, gripper in dict.fromkeys((*state.held, *after.held))
         for fault in grasp_faults(
-            gripper, box, sizes[box], poses[box], tools[gripper].tolist(), arms[gripper].palm_front
+            arms[gripper], box, sizes[box], poses[box], tools[gripper].tolist()
         )
     ]
     faults += placement_faults(scene, poses, dict(state.support) | dict(after.support))
