@@ -15,7 +15,7 @@ import yaml
 from typer.main import get_command
 
 from guided_lgp import __version__, cache, cli, doctor
-from guided_lgp.errors import InputError, WorkerError
+from guided_lgp.errors import InputError, WorkerError, pybullet_remedy
 
 ROOT = Path(__file__).parents[1]
 SCENE = ROOT / "examples" / "three_boxes.json"
@@ -336,6 +336,20 @@ def test_doctor_says_how_to_mend(capsys: pytest.CaptureFixture[str]) -> None:
     assert findings["Cache"]["ok"]
     assert findings["Policy paper"]["ok"]
     assert all(finding["ok"] or finding["mend"] for finding in findings.values())
+
+
+def test_without_pybullet_one_line_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert pybullet_remedy((3, 11)) == "pip install pybullet"
+    assert pybullet_remedy((3, 13)).endswith("or Python 3.10 or 3.11")
+    code = "import sys; sys.modules['pybullet'] = None; from guided_lgp.cli import main; main()"
+    words = [sys.executable, "-c", code, "plan", str(SCENE), "--goal", "(on red green)"]
+    done = subprocess.run(words, text=True, capture_output=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr == f"error: PyBullet: is not installed (accepted: {pybullet_remedy()})\n"
+    monkeypatch.setattr(doctor, "find_spec", lambda _: None)
+    finding = doctor._pybullet()
+    assert not finding.ok
+    assert finding.mend == pybullet_remedy()
 
 
 def test_doctor_finds_a_damaged_cache_and_mends_it(

@@ -1,5 +1,6 @@
 """The wheel, in an environment with nothing but what it declares: planning from an empty folder."""
 
+import ast
 import json
 import re
 import shutil
@@ -12,6 +13,7 @@ from importlib.metadata import Distribution
 from pathlib import Path
 
 import pytest
+import tomllib
 import yaml
 from packaging.requirements import Requirement
 
@@ -176,6 +178,26 @@ def test_the_lock_pins_every_file(environment: Path) -> None:
     }
     assert {re.sub(r"[-_.]+", "-", name).lower() for name in required} <= locked
     assert (ROOT / "requirements-torch.lock").read_text().startswith("torch==")
+
+
+def test_the_sources_use_nothing_newer_than_the_oldest_python() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert project["requires-python"] == ">=3.10,<3.14"
+    newer = {
+        "Self",
+        "StrEnum",
+        "LiteralString",
+        "Never",
+        "assert_never",
+        "UTC",
+        "chdir",
+        "override",
+    }
+    for file in (ROOT / "src").rglob("*.py"):
+        tree = ast.parse(file.read_text(encoding="utf-8"), feature_version=(3, 10))
+        imports = [node for node in ast.walk(tree) if isinstance(node, ast.Import | ast.ImportFrom)]
+        names = {alias.name for node in imports for alias in node.names}
+        assert names.isdisjoint(newer | {"tomllib"}), file
 
 
 def test_the_version_is_said_once() -> None:

@@ -10,6 +10,7 @@ import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from functools import cache
 from hashlib import sha256
 from importlib.util import find_spec
 from pathlib import Path
@@ -95,6 +96,7 @@ def _make(
     source: str, commands: Sequence[Sequence[str]], answer: int, folder: Path
 ) -> bytes | None:
     """The library of the first compiler whose library works."""
+    _announce()
     code, library = folder / "code.c", folder / "code.so"
     code.write_text(source, encoding="utf-8")
     check = [sys.executable, "-I", "-S", "-c", _CHECK, str(library), _PROBE, str(answer)]
@@ -104,6 +106,12 @@ def _make(
             return library.read_bytes()
         logger.warning("%s makes no library that works", " ".join(command))
     return None
+
+
+@cache
+def _announce() -> None:
+    """Tell who waits for the first plan of an installation why, once."""
+    logger.info("compiling the solver for this robot and machine, once")
 
 
 def _runs(arguments: Sequence[str]) -> bool:

@@ -11,7 +11,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryFile
 
-from guided_lgp.errors import InputError
+from guided_lgp.errors import InputError, pybullet_remedy
 from guided_lgp.paths import DESCRIPTIONS, MODELS, SOURCES
 from guided_lgp.policy.registry import POLICIES, load_policy
 
@@ -33,15 +33,21 @@ class Finding:
 
 def examine() -> list[Finding]:
     """Run every check, in an order in which each one makes sense."""
-    checks: list[Callable[[], Finding]] = [_python, _packages, _robot, _compiler, _cache]
+    checks: list[Callable[[], Finding]] = [_python, _pybullet, _packages, _robot, _compiler, _cache]
     checks += [partial(_policy, name) for name in POLICIES]
     return [check() for check in [*checks, _pipeline]]
 
 
 def _python() -> Finding:
-    ok = sys.version_info[:2] == (3, 11)
-    mend = "" if ok else "make a virtual environment with 3.11, for which PyBullet has a wheel"
+    ok = (3, 10) <= sys.version_info[:2] <= (3, 13)
+    mend = "" if ok else "make a virtual environment with Python 3.10 to 3.13"
     return Finding("Python", ok, platform.python_version(), mend)
+
+
+def _pybullet() -> Finding:
+    if find_spec("pybullet") is None:
+        return Finding("PyBullet", False, "is not installed", pybullet_remedy())
+    return Finding("PyBullet", True, f"version {metadata.version('pybullet')}")
 
 
 def _packages() -> Finding:

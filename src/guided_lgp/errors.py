@@ -1,5 +1,7 @@
 """Errors that a user can mend."""
 
+import sys
+
 LONGEST = 300
 """Characters of a line that says what is wrong."""
 
@@ -30,6 +32,13 @@ class InputError(ValueError):
         fault = shortened(fault)
         text = f"{where}: {fault} (accepted: {accepted})" if accepted else f"{where}: {fault}"
         return printable(text)
+
+
+def pybullet_remedy(version: tuple[int, int] = sys.version_info[:2]) -> str:
+    """What to do where PyBullet is missing: it has no wheels for Python 3.12 and newer."""
+    if version < (3, 12):
+        return "pip install pybullet"
+    return "pip install pybullet (compiles it with a C++ compiler), or Python 3.10 or 3.11"
 
 
 class WorkerError(RuntimeError):

@@ -9,7 +9,7 @@ import json
 from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field, ValidationError, model_validator
@@ -97,7 +97,7 @@ class Plan(Document):
         )
 
     @model_validator(mode="after")
-    def _consistent(self) -> Self:
+    def _consistent(self) -> "Plan":
         moving = self.scene.robot.description.moving_joints
         if sorted(self.joint_names) != sorted(moving):
             raise ValueError(f"joint_names are not the {len(moving)} of arms and fingers")

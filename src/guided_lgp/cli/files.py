@@ -2,7 +2,7 @@
 
 import json
 import shutil
-from enum import StrEnum
+from enum import Enum
 from pathlib import Path
 from typing import Annotated
 
@@ -96,7 +96,7 @@ def pddl(
         typer.echo(f"written: {folder / name}")
 
 
-class Format(StrEnum):
+class Format(str, Enum):
     """Files that have a JSON Schema."""
 
     SCENE = "scene"

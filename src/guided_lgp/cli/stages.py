@@ -3,7 +3,7 @@
 import os
 import signal
 import sys
-from enum import StrEnum
+from enum import Enum
 from importlib import import_module
 from pathlib import Path
 from typing import Annotated
@@ -31,7 +31,7 @@ STAGES = {
 """The module of each stage of dvc.yaml; its ``run(params, root)`` does the work."""
 
 
-class Network(StrEnum):
+class Network(str, Enum):
     """The networks of the hierarchical policy."""
 
     INSTRUCTION = "instruction"

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
 
@@ -53,7 +53,7 @@ class Sizes(_Figures):
     path_calls_mean: Number | None
 
     @model_validator(mode="after")
-    def _means_of_what_was_solved(self) -> Self:
+    def _means_of_what_was_solved(self) -> "Sizes":
         if (self.plan_length_mean is None) != (self.coarse_calls_mean is None):
             raise ValueError("has means of some figures and not of others")
         return self
@@ -85,7 +85,7 @@ class Fit(_Figures):
     ]
 
     @model_validator(mode="after")
-    def _same_lengths(self) -> Self:
+    def _same_lengths(self) -> "Fit":
         if any(len(row) != len(self.confusion) for row in self.confusion):
             raise ValueError("confusion is not square")
         if len(self.curves) != 4 or {len(c) for c in self.curves.values()} != {self.epochs}:

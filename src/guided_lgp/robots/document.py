@@ -5,7 +5,7 @@ mirrors another one has the same names but for that.
 """
 
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal
 
 import yaml
 from pydantic import Field, ValidationError, model_validator
@@ -143,7 +143,7 @@ class ArmDocument(Document):
         return _replaced(data, SIDE, side) if isinstance(side, str) else data
 
     @model_validator(mode="after")
-    def _one_value_per_joint(self) -> Self:
+    def _one_value_per_joint(self) -> "ArmDocument":
         for field in ("home", "lever_arms", "reaches", "signs"):
             values = getattr(self, field)
             if values and len(values) != len(self.joints):

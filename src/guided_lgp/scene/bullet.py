@@ -4,6 +4,8 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from guided_lgp.errors import InputError, pybullet_remedy
+
 
 @contextmanager
 def _silent_errors() -> Iterator[None]:
@@ -18,7 +20,10 @@ def _silent_errors() -> Iterator[None]:
         os.close(nowhere)
 
 
-with _silent_errors():
-    import pybullet
+try:
+    with _silent_errors():
+        import pybullet
+except ModuleNotFoundError:
+    raise InputError("PyBullet", "is not installed", pybullet_remedy()) from None
 
 __all__ = ["pybullet"]

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 from itertools import combinations
 from types import TracebackType
-from typing import Self
 from weakref import finalize
 
 import numpy as np
@@ -122,7 +121,7 @@ class World:
         self._dressed = False
         self.set(self._description.home, initial_poses(scene))
 
-    def __enter__(self) -> Self:
+    def __enter__(self) -> "World":
         return self
 
     def __exit__(

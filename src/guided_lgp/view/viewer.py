@@ -3,7 +3,7 @@
 import io
 from collections.abc import Mapping
 from contextlib import redirect_stdout
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 import viser
@@ -42,7 +42,7 @@ class Viewer:
         self._add_robot()
         self._add_tables_and_boxes()
 
-    def __enter__(self) -> Self:
+    def __enter__(self) -> "Viewer":
         return self
 
     def __exit__(self, *_: object) -> None:
