@@ -75,7 +75,7 @@ def _compilers() -> Iterator[list[str]]:
         if path is not None:
             yield [path]
     if find_spec("ziglang") is not None:
-        yield [sys.executable, "-m", "ziglang", "cc"]
+        yield [sys.executable, "-P", "-m", "ziglang", "cc"]  # not one of the current folder
 
 
 def _identity(command: Sequence[str]) -> str:

@@ -1,8 +1,8 @@
 """Files between the stages: scenes, tables, data set, models, metrics. Damaged ones are refused."""
 
 import json
-import math
 import struct
+import sys
 from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
@@ -436,8 +436,8 @@ def finite(value: Any) -> bool:
             return all(map(finite, value.values()))
         case list():
             return all(map(finite, value))
-        case float():
-            return math.isfinite(value)
+        case int() | float():
+            return abs(value) <= sys.float_info.max
     return True
 
 

@@ -99,3 +99,39 @@ def test_a_file_of_another_form_is_told(tmp_path: Path, text: str) -> None:
     with pytest.raises(InputError, match=r"robot\.yaml: ") as error:
         load_robot(str(tmp_path / "robot.yaml"))
     assert len(str(error.value).splitlines()) == 1
+
+
+def test_a_key_twice_is_refused(folder: Path) -> None:
+    file = Path(written(folder, DOCUMENT))
+    file.write_text(file.read_text() + "acceleration: 3.0\n")
+    with pytest.raises(
+        InputError, match=r"own\.yaml: is not YAML: has the key 'acceleration' twice"
+    ):
+        load_robot(str(file))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "fault"),
+    [
+        ('parent link="link1"', 'parent link="link0"', "'joint2' does not connect two links"),
+        ('child link="link2"', 'child link="link1"', "link 'link1' hangs on two joints"),
+        ('parent link="base"', 'parent link="link6"', "link 'link1' hangs on itself"),
+        ('link name="link2"', 'link name="link1"', "'link1' comes 2 times"),
+        ('type="fixed"', 'type="welded"', "'welded' is none of revolute"),
+        ('upper="3" velocity', 'upper="three" velocity', "limit upper: 'three' is not 1 sensible"),
+        ('upper="3" velocity', 'upper="nan" velocity', "limit upper: 'nan' is not 1 sensible"),
+        ('effort="10"', "", "'joint1' does not have the limits lower, upper, velocity, effort"),
+        ('xyz="0 0 0.15"', 'xyz="0 0.15"', "origin xyz: '0 0.15' is not 3 sensible numbers"),
+        ('box size="0.2 0.2 0.1"', 'box size="0.2 0 0.1"', "box: its size is not positive"),
+        ('box size="0.2 0.2 0.1"', "ball", "a geometry is not one of box"),
+        ("</robot>", "", "no element found"),
+    ],
+)
+def test_a_urdf_that_describes_no_robot(folder: Path, old: str, new: str, fault: str) -> None:
+    urdf = folder / "own_description" / "own.urdf"
+    content = urdf.read_text()
+    assert old in content
+    urdf.write_text(content.replace(old, new, 1))
+    with pytest.raises(InputError, match=rf"description\.urdf: .*({fault})") as error:
+        load_robot(written(folder, DOCUMENT))
+    assert len(str(error.value).splitlines()) == 1

@@ -31,7 +31,7 @@ def mlflow_ui(
     experiment = tracking.prepare().get_experiment_by_name(tracking.EXPERIMENT)
     address = f"http://127.0.0.1:{port}/#/experiments/{experiment.experiment_id}/runs"
     typer.echo(f"MLflow: {address} (Ctrl-C ends it)")
-    command = [sys.executable, "-m", "mlflow", "server", "--host", "127.0.0.1"]
+    command = [sys.executable, "-P", "-m", "mlflow", "server", "--host", "127.0.0.1"]
     command += ["--port", str(port), "--workers", "1"]
     command += ["--backend-store-uri", tracking.tracking_uri()]
     os.execv(sys.executable, command)

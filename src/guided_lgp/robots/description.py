@@ -1,5 +1,6 @@
 """A robot's description: its URDF and SRDF, found and made ready for PyBullet and pinocchio."""
 
+import copy
 import json
 import os
 import xml.etree.ElementTree as ET
@@ -18,6 +19,7 @@ from guided_lgp.errors import InputError
 from guided_lgp.paths import DESCRIPTIONS
 from guided_lgp.robots.document import DescriptionFiles
 from guided_lgp.robots.measures.pairs import sampled_pairs
+from guided_lgp.robots.urdf import read_urdf, read_xml
 
 _STL_FACET = np.dtype([("normal", "<f4", 3), ("vertices", "<f4", (3, 3)), ("attribute", "<u2")])
 _STL_HEADER = 84
@@ -53,10 +55,7 @@ class Description:
 
     @cached_property
     def _root(self) -> ET.Element:
-        try:
-            return ET.parse(self.source).getroot()
-        except (OSError, ET.ParseError) as error:
-            raise InputError(f"{self.where}: description.urdf", str(error), "a URDF") from None
+        return read_urdf(self.source, f"{self.where}: description.urdf")
 
     @cached_property
     def links(self) -> tuple[str, ...]:
@@ -103,8 +102,7 @@ class Description:
         would assume 1 kg; and meshes without normals, which would be drawn black, are drawn from
         repaired copies. Their names depend on their content.
         """
-        text = self.source.read_text(encoding="utf-8")
-        root = ET.fromstring(text)
+        root = copy.deepcopy(self._root)
         for mesh in root.iter("mesh"):
             mesh.set("filename", str(self._resolved(mesh.get("filename", ""))))
         for link in root.iter("link"):
@@ -129,10 +127,7 @@ class Description:
         if self.srdf is None:
             return self._sampled_pairs
         where = f"{self.where}: description.srdf"
-        try:
-            root = ET.parse(self.srdf).getroot()
-        except (OSError, ET.ParseError) as error:
-            raise InputError(where, str(error), "an SRDF") from None
+        root = read_xml(self.srdf, where, "an SRDF")
         pairs = [
             (pair.get("link1", ""), pair.get("link2", ""))
             for pair in root.iter("disable_collisions")
@@ -228,16 +223,19 @@ class Description:
 
     def _resolved(self, name: str) -> Path:
         """The file that a URDF means, relative to itself or to a package."""
+        where = f"{self.where}: description.packages"
         if not name.startswith(_PACKAGE):
-            return (self.source.parent / name.removeprefix("file://")).resolve()
+            file = (self.source.parent / name.removeprefix("file://")).resolve()
+            if not file.is_file():
+                raise InputError(f"{self.where}: description.urdf", f"{file} is not a file")
+            return file
         package, _, rest = name.removeprefix(_PACKAGE).partition("/")
-        if package in self.packages:
-            return self.packages[package] / rest
-        for folder in self.source.parents:
+        above = self.source.parents
+        folders = [self.packages[package]] if package in self.packages else above
+        for folder in folders:
             for candidate in (folder / package / rest, folder / rest):
                 if candidate.is_file():
                     return candidate
-        where = f"{self.where}: description.packages"
         raise InputError(where, f"{name} is not above {self.source}", f"{package}: its folder")
 
 
@@ -275,7 +273,7 @@ def _shipped(package: str, name: str) -> Path:
         return DESCRIPTIONS / name
     try:
         recorded = files(package) or []
-    except PackageNotFoundError:
+    except (PackageNotFoundError, ValueError):  # the second: no name of a package at all
         raise InputError(package, "is not installed", f"pip install {package}") from None
     parts = Path(name).parts
     for file in recorded:

@@ -7,10 +7,9 @@ mirrors another one has the same names but for that.
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import yaml
 from pydantic import Field, ValidationError, model_validator
 
-from guided_lgp.errors import InputError
+from guided_lgp.documents import read_yaml
 from guided_lgp.faults import Document, first_fault
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
@@ -188,12 +187,7 @@ def read_document(file: Path) -> RobotDocument:
     Raises:
         InputError: the first fault, with file and field.
     """
-    try:
-        data = yaml.safe_load(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(str(file), error.strerror or "cannot be read", "a robot file") from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise InputError(str(file), f"is not YAML: {' '.join(str(error).split())}") from None
+    data = read_yaml(file, "a robot file")
     try:
         return RobotDocument.model_validate(data)
     except ValidationError as error:

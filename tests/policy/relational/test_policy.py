@@ -259,14 +259,14 @@ def copy(models: Path, tmp_path: Path) -> Path:
 @pytest.mark.parametrize(
     ("field", "value", "fault"),
     [
-        ("version", 99, "version: input should be 1"),
+        ("version", 99, "version: 99 is not 1"),
         ("nodes", ["x"], "nodes, edges: are not what this program encodes"),
         ("limits", {"lower": [0, 0, 0], "upper": [1, 0, 1]}, "limits"),
         ("limits", {"lower": [0], "upper": [1]}, "limits"),
         ("limits", {"lower": "abc", "upper": [1, 1, 1]}, "limits"),
         ("limits", None, "limits"),
-        ("width", 1.5, "width: input should be a valid integer"),
-        ("rounds", 10**9, "rounds: input should be less than or equal to 1024"),
+        ("width", 1.5, "width: 1.5 is not a whole number"),
+        ("rounds", 10**9, "rounds: 1000000000 is more than 1024"),
         ("width", 13, "does not have the weights that its JSON describes"),
     ],
 )
