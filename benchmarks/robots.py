@@ -19,8 +19,8 @@ from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.logic import Skeleton, applicable_actions, successor
 from guided_lgp.params import load_params
 from guided_lgp.paths import SOURCES
+from guided_lgp.scene import Box, PlacedRobot, Scene, Table
 from guided_lgp.scene.footprints import footprint, gap, inset
-from guided_lgp.scene.model import Box, PlacedRobot, Scene, Table
 from path import goals_after
 
 SEED = 20_000

@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 
 from guided_lgp.poses import Array, quaternion
-from guided_lgp.scene.model import Box
+from guided_lgp.scene.bodies import Box
 
 PITCHES = (np.pi / 2, np.pi / 3, np.pi / 4, np.pi / 6, 0.0)
 """Angles (rad) at which the gripper points down when it grasps: from above to from the side."""

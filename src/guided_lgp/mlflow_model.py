@@ -16,8 +16,7 @@ from guided_lgp.policy.declaration import DeclaredPolicy
 from guided_lgp.policy.paper.inference import chain_log_probabilities
 from guided_lgp.policy.paper.model import Model, load_model
 from guided_lgp.policy.registry import POLICIES
-from guided_lgp.scene import Scene
-from guided_lgp.scene.model import Box, Table, parse_scene
+from guided_lgp.scene import Box, Scene, Table, parse_scene
 from guided_lgp.search.observation import observe, start
 
 _SCENE = Scene(

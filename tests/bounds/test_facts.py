@@ -14,7 +14,7 @@ from guided_lgp.bounds.results import Array
 from guided_lgp.logic import Skeleton, applicable_actions, parse_skeleton, successor
 from guided_lgp.poses import rotation_matrix
 from guided_lgp.scene import Scene, generate
-from guided_lgp.scene.model import Box, Table
+from guided_lgp.scene.bodies import Box, Table
 
 LEFT = Table(name="left", position=(0.54, 0.4, 0.6), half_extents=(0.17, 0.2))
 RIGHT = Table(name="right", position=(0.54, -0.4, 0.6), half_extents=(0.17, 0.2))

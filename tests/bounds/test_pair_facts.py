@@ -8,9 +8,9 @@ from guided_lgp.bounds.coarse.parts import projected, stacked_with
 from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.logic import Action, applicable_actions, parse_skeleton
 from guided_lgp.params import BoundsParams
+from guided_lgp.scene import Box, Scene, Table
 from guided_lgp.scene.families import draw_problems, find_family
 from guided_lgp.scene.families.rows import Rows
-from guided_lgp.scene.model import Box, Scene, Table
 
 PARAMS = BoundsParams(coarse_tries=12, path_solutions=1)
 TABLES = (

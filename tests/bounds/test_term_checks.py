@@ -108,7 +108,7 @@ def test_balanced() -> None:
         boxes = {n: pose((*p, 0.7)).tolist() for n, p in zip(sizes, points, strict=True)}
         on = {"red": "tab", "green": "red", "blue": "red"}
         top = Top(pose((*support[:2], 0.6), support[2]).tolist(), half, 0.6)
-        excess = balanced.check("red", boxes, sizes, on, top)
+        excess = balanced.check("red", boxes, dict(zip(sizes, masses, strict=True)), on, top)
         assert excess == pytest.approx(-rows.min(), abs=1e-9)
         verdicts.append(excess < 0)
     both_verdicts(verdicts)

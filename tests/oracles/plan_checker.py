@@ -43,6 +43,8 @@ IN_HAND = 0.015  # allowed within them: the hull of a finger fills the hollow of
 STEP = 0.01  # of the fastest link point between two collision checks
 ON_SUPPORT = 0.005  # a corner of a standing box may be off the plane of its support by this much
 TABLE_THICKNESS = 0.03  # a scene gives the top alone; below a slab, links are free to pass
+FLAT = 0.001  # vertices so near to the highest or lowest one are of one face
+ROUND = 60  # sides of the prism that stands for a cylinder
 HULL_MARGIN = 0.001  # by which PyBullet inflates a hull
 APPROACH = 0.12  # length of the straight motion to or from a box on which fingers may touch it
 AT_BOX = 0.005  # distance of a finger from the box that it holds
@@ -93,8 +95,9 @@ class Plan:
     urdf: Path
     srdf: Path | None
     stand: tuple[float, float]  # half extents of the column under a raised base
-    boxes: dict[str, dict[str, Any]]
-    tables: dict[str, dict[str, Any]]
+    boxes: dict[str, dict[str, Any]]  # what may be moved
+    tables: dict[str, dict[str, Any]]  # what may be stood on and is not moved
+    obstacles: dict[str, dict[str, Any]]
     base: tuple[float, float, float, float]  # x, y, height, yaw
     goals: list[tuple[str, ...]]
     actions: list[tuple[str, ...]]
@@ -179,8 +182,12 @@ def _read(document: Mapping[str, Any]) -> Plan:
         urdf=robot["description"]["urdf"],
         srdf=robot["description"].get("srdf"),
         stand=tuple(robot.get("stand", (0.1, 0.1))),
-        boxes={box["name"]: box for box in scene["boxes"]},
-        tables={table["name"]: table for table in scene["tables"]},
+        boxes={box["name"]: box for box in scene["boxes"] if not box.get("fixed")},
+        tables={
+            body["name"]: body
+            for body in [*scene["tables"], *(box for box in scene["boxes"] if box.get("fixed"))]
+        },
+        obstacles={body["name"]: body for body in scene.get("obstacles", [])},
         base=(x, y, float(placed.get("height", 0.0)), yaw),
         goals=[_atom(goal, GOALS) for goal in document["objective"]],
         actions=[_atom(action, ACTIONS) for action in document["actions"]],
@@ -270,9 +277,33 @@ def _merged(attachments: Iterable[Attachment]) -> list[Attachment]:
 
 
 def _scene_pose(plan: Plan, name: str) -> np.ndarray:
-    """The centre of a box, or the centre of the top of a table."""
-    item = plan.boxes.get(name) or plan.tables[name]
-    return _planar(*item["position"], item.get("yaw", 0.0))
+    """The centre of a body, or the centre of the top of a table."""
+    item = (plan.boxes | plan.tables | plan.obstacles)[name]
+    pose = _planar(*item["position"], item.get("yaw", 0.0))
+    if "quaternion" in item:
+        pose[:3, :3] = Rotation.from_quat(item["quaternion"]).as_matrix()
+    return pose
+
+
+def _body(item: Mapping[str, Any]) -> np.ndarray:
+    """Vertices (n, 3) of a body about its pose; of a cylinder, those of a prism around it."""
+    if "half_extents" in item:
+        x, y = item["half_extents"]
+        return _corners((2 * x, 2 * y, TABLE_THICKNESS)) - (0, 0, TABLE_THICKNESS / 2)
+    if item.get("shape") == "mesh":
+        return np.array(item["vertices"], float)
+    if item.get("shape") == "cylinder":
+        angles = np.linspace(0, 2 * np.pi, ROUND, endpoint=False)
+        radius = item["size"][0] / 2 / np.cos(np.pi / ROUND)
+        ring = [(radius * np.cos(angle), radius * np.sin(angle)) for angle in angles]
+        return np.array([(x, y, z * item["size"][2] / 2) for x, y in ring for z in (-1, 1)])
+    return _corners(item["size"])
+
+
+def _face(vertices: np.ndarray, side: Literal[-1, 1]) -> np.ndarray:
+    """The vertices of a flat top (1) or base (-1)."""
+    heights = side * vertices[:, 2]
+    return vertices[heights > heights.max() - FLAT]
 
 
 def _planar(x: float, y: float, z: float, yaw: float) -> np.ndarray:
@@ -490,14 +521,14 @@ def _is_at(pose: np.ndarray, numbers: list[float]) -> bool:
 
 def _is_in(plan: Plan, motion: Motion, box: str, table: str, region: list[float]) -> bool:
     frame = motion.boxes[table][-1] if table in plan.boxes else _scene_pose(plan, table)
-    corners = _points(motion.boxes[box][-1:], _base(plan.boxes[box]["size"]))[0, :3].T
+    corners = _points(motion.boxes[box][-1:], _face(_body(plan.boxes[box]), -1))[0, :3].T
     local = (corners - frame[:3, 3]) @ frame[:3, :3]
     low, high = np.array(region[:2]) - EDGE, np.array(region[2:]) + EDGE
     return bool(((local[:, :2] >= low) & (local[:, :2] <= high)).all())
 
 
 def _stays_level(plan: Plan, motion: Motion, box: str) -> bool:
-    corners = _points(motion.boxes[box], _base(plan.boxes[box]["size"]))
+    corners = _points(motion.boxes[box], _face(_body(plan.boxes[box]), -1))
     width = float(np.linalg.norm(plan.boxes[box]["size"][:2]))
     return bool((np.ptp(corners[:, 2], axis=1) <= UPRIGHT * width).all())
 
@@ -666,7 +697,7 @@ def _standing(plan: Plan, events: Sequence[Event], motion: Motion) -> Iterator[F
                 reported.add((box, support))
                 yield Fault("support", row, f"{box} on {support}: {why}")
     for box, pose in motion.boxes.items():
-        rise = np.ptp(_points(pose, _base(plan.boxes[box]["size"]))[:, 2], axis=1)
+        rise = np.ptp(_points(pose, _face(_body(plan.boxes[box]), -1))[:, 2], axis=1)
         loaded = [state.carried(box) != [] for state in states]
         tilted = np.flatnonzero(np.array(loaded) & (rise > ON_SUPPORT))
         if tilted.size:
@@ -678,27 +709,27 @@ def _standing(plan: Plan, events: Sequence[Event], motion: Motion) -> Iterator[F
 def _unstable(
     plan: Plan, state: State, box: str, support: str, poses: Mapping[str, np.ndarray]
 ) -> str | None:
-    if support in plan.tables:
-        ground, half = _scene_pose(plan, support), np.array(plan.tables[support]["half_extents"])
-    else:
-        size = np.array(plan.boxes[support]["size"])
-        ground = poses[support] @ _planar(0, 0, size[2] / 2, 0)
-        half = size[:2] / 2
-    into = _inverse(ground)
-    gaps = (into @ poses[box] @ _homogeneous(_base(plan.boxes[box]["size"])).T)[2]
+    bodies = plan.boxes | plan.tables
+    top, base = _face(_body(bodies[support]), 1), _face(_body(bodies[box]), -1)
+    below = poses[support] if support in plan.boxes else _scene_pose(plan, support)
+    into = _inverse(below @ _planar(0, 0, top[:, 2].max(), 0))
+    gaps = (into @ poses[box] @ _homogeneous(base).T)[2]
     if np.abs(gaps).max() > ON_SUPPORT:
         return f"the bottom is {1e3 * gaps.min():.0f} to {1e3 * gaps.max():.0f} mm above it"
     stack = [box, *state.carried(box)]
-    masses = [np.prod(plan.boxes[name]["size"]) for name in stack]
-    centre = into @ np.average([poses[name][:, 3] for name in stack], axis=0, weights=masses)
-    if (np.abs(centre[:2]) > half).any():
+    masses = [ConvexHull(_body(plan.boxes[name])).volume for name in stack]
+    centre = np.average([poses[name][:, 3] for name in stack], axis=0, weights=masses)
+    if not _over(into @ centre, top):
         return f"the centre of {' '.join(stack)} is not over it"
+    if not _over(_inverse(poses[box]) @ centre, base):
+        return f"the centre of {' '.join(stack)} is not over its base"
     return None
 
 
-def _base(size: Sequence[float]) -> np.ndarray:
-    corners = _corners(size)
-    return corners[corners[:, 2] < 0]
+def _over(point: np.ndarray, face: np.ndarray) -> bool:
+    """Whether a point (4,) is above the hull of a face (n, 3), both in the frame of the body."""
+    edges = ConvexHull(face[:, :2]).equations
+    return bool((edges @ (point[0], point[1], 1.0) <= 0).all())
 
 
 def _homogeneous(points: np.ndarray) -> np.ndarray:
@@ -785,12 +816,8 @@ class _World:
     def __init__(self, plan: Plan, robot: Robot) -> None:
         self.client = pybullet.connect(pybullet.DIRECT)
         self.vertices = dict(robot.hulls)
-        for name, box in plan.boxes.items():
-            self.vertices[name] = _corners(box["size"])
-        for name, table in plan.tables.items():
-            x, y = table["half_extents"]
-            slab = _corners((2 * x, 2 * y, TABLE_THICKNESS))
-            self.vertices[name] = slab - (0, 0, TABLE_THICKNESS / 2)
+        for name, item in (plan.boxes | plan.tables | plan.obstacles).items():
+            self.vertices[name] = _body(item)
         height = plan.base[2]
         if height:
             column = _corners((2 * plan.stand[0], 2 * plan.stand[1], height))
@@ -827,7 +854,7 @@ class _World:
 
 def _samples(plan: Plan, robot: Robot, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
     """Intervals (m,) and joint positions (m, joints) so close that no link point moves a step."""
-    vertices = robot.hulls | {name: _corners(box["size"]) for name, box in plan.boxes.items()}
+    vertices = robot.hulls | {name: _body(box) for name, box in plan.boxes.items()}
     reach = np.zeros(len(plan.times) - 1)
     for name, pose in (motion.links | motion.boxes).items():
         moves = np.linalg.norm(np.diff(_points(pose, vertices[name]), axis=0), axis=1)
@@ -860,7 +887,7 @@ def _collisions(
         in_hand = _inverse(motion.tools[gripper][start]) @ motion.boxes[box][start]
         dense[box][held] = grips[gripper][held] @ in_hand
         dense[box][intervals >= end] = motion.boxes[box][end]
-    for table in plan.tables:
+    for table in (*plan.tables, *plan.obstacles):
         dense[table] = np.tile(_scene_pose(plan, table), (len(q), 1, 1))
     dense[COLUMN] = np.tile(robot.base, (len(q), 1, 1))
     declared = _declared_contacts(plan, robot, events, motion)
@@ -894,8 +921,9 @@ def _pairs(plan: Plan, robot: Robot) -> Iterator[tuple[str, str]]:
         pairs = ET.parse(plan.srdf).getroot().iter("disable_collisions")
         disabled = {frozenset((pair.get("link1"), pair.get("link2"))) for pair in pairs}
     column = [COLUMN] if plan.base[2] else []
-    still = robot.fixed | plan.tables.keys() | set(column)  # what touches there always does
-    for pair in itertools.combinations([*robot.hulls, *plan.boxes, *plan.tables, *column], 2):
+    bodies = [*plan.boxes, *plan.tables, *plan.obstacles, *column]
+    still = {*robot.fixed, *plan.tables, *plan.obstacles, *column}  # what touches there always does
+    for pair in itertools.combinations([*robot.hulls, *bodies], 2):
         links = frozenset(robot.link.get(name, name) for name in pair)
         if len(links) == 2 and links not in disabled and not set(pair) <= still:
             yield pair

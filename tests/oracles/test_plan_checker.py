@@ -16,7 +16,7 @@ from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.logic import parse_objective, parse_skeleton
 from guided_lgp.params import load_params
 from guided_lgp.paths import SOURCES
-from guided_lgp.scene import Scene, generate, parse_scene
+from guided_lgp.scene import Scene, generate, load_scene, parse_scene
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 TASKS = {
@@ -313,3 +313,31 @@ def test_one_arm_on_a_column_is_accepted_and_its_faults_told(tmp_path: Path) -> 
     assert check(plan) == []
     set_joint(plan, "panda_finger_joint1", 0.0)
     assert {"mimic", "fingers", "grasp"} & kinds(check(plan))
+
+
+@pytest.fixture(scope="module")
+def in_kitchen(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """A box goes on what is fixed, past obstacles and under a shelf; a can goes on a mesh."""
+    box = "(grasp pr2L 003_cracker_box) (place pr2L 003_cracker_box step)"
+    skeleton = f"{box} (grasp pr2L can) (place pr2L can wedge)"
+    scene = load_scene(EXAMPLES / "kitchen.json")
+    return written_plan(tmp_path_factory.mktemp("kitchen"), scene, skeleton, "(on can wedge)")
+
+
+def test_other_shapes_and_obstacles_are_accepted(in_kitchen: dict[str, Any]) -> None:
+    assert check(in_kitchen) == []
+
+
+def test_an_obstacle_in_the_way_is_told(in_kitchen: dict[str, Any]) -> None:
+    plan = copy.deepcopy(in_kitchen)
+    plan["scene"]["obstacles"][0]["position"][1] = 0.2
+    assert "collision" in kinds(check(plan))
+
+
+def test_a_pointed_support_carries_nothing(in_kitchen: dict[str, Any]) -> None:
+    plan = copy.deepcopy(in_kitchen)
+    wedge = box(plan, "wedge")
+    wedge["vertices"] = [
+        [0.1 * x if z > 0 else x, 0.1 * y if z > 0 else y, z] for x, y, z in wedge["vertices"]
+    ]
+    assert any("is not over it" in fault.text for fault in check(plan))

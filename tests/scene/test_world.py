@@ -39,7 +39,7 @@ def test_pairs_are_those_of_an_exhaustive_search(world: World) -> None:
     """The broad phase, the filters and the cached contacts lose nothing and add nothing."""
     rng = np.random.default_rng(0)
     arms = {link for g in PR2.grippers for link in (*PR2.arms[g].links, *PR2.arms[g].hand_links)}
-    bodies = [*arms, *world.fixed_links, *world.boxes, *world.tables]
+    bodies = [*arms, *world.fixed_links, *world.boxes, *world.supports]
     moving = arms | set(world.boxes)
     pairs = {
         frozenset((one, other))

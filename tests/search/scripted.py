@@ -6,7 +6,7 @@ import numpy as np
 
 from guided_lgp.bounds.results import Array, CoarseResult, Failure, PathResult
 from guided_lgp.logic import Action, Objective, Skeleton, State, Symbols
-from guided_lgp.scene.model import Box, Scene, Table
+from guided_lgp.scene import Box, Scene, Table
 from guided_lgp.search.observation import start
 
 TAB1 = Table(name="tab1", position=(0.54, 0.33, 0.6), half_extents=(0.17, 0.2))

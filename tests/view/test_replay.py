@@ -12,7 +12,7 @@ from guided_lgp.errors import InputError
 from guided_lgp.logic import Action, Goal
 from guided_lgp.poses import compose, inverse, pose
 from guided_lgp.scene import Scene, generate
-from guided_lgp.scene.world import COLOURS
+from guided_lgp.scene.bodies import COLOURS
 from guided_lgp.view import motion
 from guided_lgp.view.bodies import box_colours
 from guided_lgp.view.live import view

@@ -7,6 +7,7 @@ many times faster than arrays.
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 from guided_lgp.poses import pose
 from guided_lgp.scene import Scene
@@ -31,14 +32,22 @@ class Violation:
         return f"{self.constraint} by {self.amount:.3g}"
 
 
-def box_sizes(scene: Scene) -> dict[str, tuple[float, float, float]]:
-    """Extents (m) of every box."""
-    return {box.name: box.size for box in scene.boxes}
+@lru_cache(maxsize=64)
+def box_sizes(scene: Scene) -> Mapping[str, Vector]:
+    """Extents (m) of every box that may be moved."""
+    return {box.name: box.size for box in scene.movable}
 
 
+@lru_cache(maxsize=64)
+def volumes(scene: Scene) -> Mapping[str, float]:
+    """Volume (m³) of every box that may be moved; all are equally dense."""
+    return {box.name: box.convex.volume for box in scene.movable}
+
+
+@lru_cache(maxsize=64)
 def body_names(scene: Scene) -> frozenset[str]:
-    """Boxes and tables."""
-    return frozenset([*(box.name for box in scene.boxes), *(table.name for table in scene.tables)])
+    """Boxes, tables and obstacles."""
+    return frozenset(body.name for body in scene.bodies)
 
 
 def overlap_name(first: str, second: str, bodies: Collection[str]) -> str:
@@ -58,7 +67,10 @@ def overlap_name(first: str, second: str, bodies: Collection[str]) -> str:
 
 @dataclass(frozen=True)
 class Top:
-    """What a box can stand on: pose of the body, half extents and height of its top (m)."""
+    """What a box can stand on: pose of the body, half extents and height of its top (m).
+
+    Of round and odd shapes, the half extents of a rectangle inside the top.
+    """
 
     pose: Pose
     half: Sequence[float]
@@ -67,12 +79,24 @@ class Top:
 
 def top_of(scene: Scene, boxes: Mapping[str, Pose], name: str) -> Top:
     """The top of a table or of a box."""
-    size = box_sizes(scene).get(name)
-    if size is not None:
-        half = [side / 2 for side in size]
-        return Top(boxes[name], half, boxes[name][2] + half[2])
-    table = next(table for table in scene.tables if table.name == name)
-    return Top(pose(table.position, table.yaw).tolist(), table.half_extents, table.position[2])
+    if name not in boxes:
+        return _still_tops(scene)[name]
+    half, height = _tops_in_boxes(scene)[name]
+    return Top(boxes[name], half, boxes[name][2] + height)
+
+
+@lru_cache(maxsize=64)
+def _still_tops(scene: Scene) -> Mapping[str, Top]:
+    return {
+        body.name: Top(pose(body.top, body.yaw).tolist(), body.convex.rest, body.top[2])
+        for body in scene.supports
+    }
+
+
+@lru_cache(maxsize=64)
+def _tops_in_boxes(scene: Scene) -> Mapping[str, tuple[tuple[float, float], float]]:
+    """Half extents of the tops of boxes, and their heights above the boxes' centres (m)."""
+    return {box.name: (box.convex.rest, box.convex.half[2]) for box in scene.movable}
 
 
 def axes_of(pose: Pose) -> tuple[Vector, Vector, Vector]:

@@ -272,4 +272,4 @@ class _Execution:
         return np.array([*position, *turn])
 
     def _body(self, table: str) -> int:
-        return (self._world.tables | self._world.boxes)[table]
+        return (self._world.supports | self._world.boxes)[table]

@@ -192,7 +192,7 @@ def constraint_kind(constraint: str, scene: Scene) -> str:
     ``clear l_forearm_link tab2`` becomes ``clear robot–table``, ``hold pr2L red`` becomes
     ``hold``.
     """
-    kinds = {table.name: "table" for table in scene.tables} | {b.name: "box" for b in scene.boxes}
+    kinds = {body.name: type(body).__name__.lower() for body in scene.bodies}
     kinds |= dict.fromkeys(scene.symbols.grippers, "robot")
     words = [word for word in constraint.split() if word != "of"]
     bodies = [kinds.get(word, "robot" if "_" in word else "") for word in words]

@@ -3,17 +3,23 @@
 import numpy as np
 
 from guided_lgp.poses import Array
-from guided_lgp.scene.model import Box, Table
+from guided_lgp.scene.bodies import Box, Table
 
 _CORNERS = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
 
 
 def footprint(body: Box | Table) -> Array:
     """Corners (4, 2) of a level body in the world, counter-clockwise."""
-    half = np.array(body.half_extents if isinstance(body, Table) else body.size[:2])
-    if isinstance(body, Box):
-        half = half / 2
-    return np.asarray(body.position[:2] + _CORNERS * half @ _turn(body.yaw).T)
+    return _corners(body, body.convex.half[:2])
+
+
+def seat(body: Box | Table) -> Array:
+    """Corners (4, 2) of the part of its top that may carry centres of mass."""
+    return _corners(body, body.convex.rest)
+
+
+def _corners(body: Box | Table, half: tuple[float, float]) -> Array:
+    return np.asarray(body.position[:2] + _CORNERS * np.array(half) @ _turn(body.yaw).T)
 
 
 def gap(first: Array, second: Array) -> float:

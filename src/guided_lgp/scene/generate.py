@@ -9,8 +9,9 @@ import numpy as np
 
 from guided_lgp.documents import read_json, write_json
 from guided_lgp.errors import InputError
+from guided_lgp.scene.bodies import Box, Table
 from guided_lgp.scene.footprints import footprint, gap, inset
-from guided_lgp.scene.model import Box, Scene, Table, parse_scene
+from guided_lgp.scene.model import Scene, parse_scene
 from guided_lgp.scene.setups import CLEARANCE, SETUPS, Setup
 
 _VERSION = 1

@@ -6,8 +6,9 @@ import numpy as np
 
 from guided_lgp.errors import InputError
 from guided_lgp.logic import Goal, Objective
+from guided_lgp.scene.bodies import Box, Table
 from guided_lgp.scene.footprints import footprint, gap, inset
-from guided_lgp.scene.model import Box, Scene, Table
+from guided_lgp.scene.model import Scene
 from guided_lgp.scene.tolerances import FLOAT
 
 _REACH = 100.0
@@ -26,7 +27,7 @@ def complete_objective(objective: Objective, scene: Scene) -> Objective:
 def in_the_way(body: str, objective: Objective, scene: Scene) -> frozenset[str]:
     """The boxes that stand, at the start, where goals want another box to be in the end."""
     found: set[str] = set()
-    box = next(box for box in scene.boxes if box.name == body)
+    box = next(box for box in scene.movable if box.name == body)
     for goal in objective:
         for term in scene.symbols.domain.final_terms(goal):
             if term.symbols[0] == body and "yaw" in term.options:
@@ -40,7 +41,7 @@ def _overlapped(body: Box, numbers: Mapping[str, str | float], scene: Scene) -> 
     there = body.model_copy(update={"position": (x, y, z), "yaw": yaw})
     return {
         other.name
-        for other in scene.boxes
+        for other in scene.movable
         if other.name != body.name
         and abs(other.position[2] - z) < (body.size[2] + other.size[2]) / 2 - FLOAT
         and gap(footprint(there), footprint(other)) < 0
@@ -68,11 +69,10 @@ def _is_number(words: tuple[str, ...]) -> bool:
 
 def _with_support(goal: Goal, place: int, scene: Scene) -> Goal:
     """The goal with the name of the support whose top is where its box would stand."""
-    body = next((box for box in scene.boxes if box.name in goal.symbols[:place]), None)
+    body = next((box for box in scene.movable if box.name in goal.symbols[:place]), None)
     if body is None:
         raise InputError(f"goal {goal}", "unknown box", ", ".join(scene.symbols.boxes))
-    supports: tuple[Table | Box, ...] = (*scene.tables, *scene.boxes)
-    for support in supports:
+    for support in (*scene.supports, *scene.movable):
         symbols = (*goal.symbols[:place], support.name, *goal.symbols[place:])
         whole = Goal(goal.kind, symbols)
         (term,) = scene.symbols.domain.final_terms(whole)
@@ -85,17 +85,13 @@ def _with_support(goal: Goal, place: int, scene: Scene) -> Goal:
 def _stands(body: Box, support: Table | Box, numbers: Mapping[str, str | float]) -> bool:
     """Whether the body would stand on the top of a support, where that is at the start."""
     x, y, z, tolerance = (float(numbers[name]) for name in ("x", "y", "z", "tolerance"))
-    height = _top(support) + body.size[2] / 2
+    height = support.top[2] + body.size[2] / 2
     return abs(z - height) <= tolerance and bool(inset(footprint(support), np.array([x, y])) >= 0)
 
 
-def _top(support: Table | Box) -> float:
-    return support.position[2] + (support.size[2] / 2 if isinstance(support, Box) else 0.0)
-
-
 def _heights(body: Box, scene: Scene) -> Iterator[tuple[str, float]]:
-    for table in scene.tables:
-        yield table.name, _top(table) + body.size[2] / 2
+    for support in scene.supports:
+        yield support.name, support.top[2] + body.size[2] / 2
 
 
 def _check_numbers(goal: Goal, numbers: Mapping[str, str | float]) -> None:

@@ -1,22 +1,17 @@
-"""The scene document: robot, tables and boxes."""
+"""The scene document: robot, tables, boxes and obstacles."""
 
-import math
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import (
-    AfterValidator,
     BaseModel,
     ConfigDict,
     Field,
     SerializerFunctionWrapHandler,
     ValidationError,
-    ValidatorFunctionWrapHandler,
-    WrapValidator,
     field_validator,
     model_serializer,
     model_validator,
@@ -24,66 +19,22 @@ from pydantic import (
 
 from guided_lgp.documents import read_json
 from guided_lgp.domains import PAPER, domain_names, load_domain
-from guided_lgp.faults import Document, brief, first_fault, refuse_unknown
+from guided_lgp.faults import Document, first_fault, refuse_unknown
 from guided_lgp.logic import State, Symbols
 from guided_lgp.poses import Array, compose, pose
 from guided_lgp.robots import Robot, load_robot
-
-
-def _no_more_than(most: float, hint: str) -> WrapValidator:
-    """Suspect another unit in numbers that are too large."""
-
-    def check(value: Any, within: ValidatorFunctionWrapHandler) -> Any:
-        if isinstance(value, int | float) and abs(value) > most:
-            raise ValueError(f"{brief(value)} is too large: {hint}")
-        return within(value)
-
-    return WrapValidator(check)
-
-
-_METRES = "lengths are in m; is this in mm or cm?"
-_RADIANS = "angles are in rad; are these degrees?"
-_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
-
-
-def _speakable(name: str) -> str:
-    """Names stand in goals, between blanks and parentheses."""
-    if not _NAME.fullmatch(name):
-        raise ValueError(f"the name {brief(name)} has other characters than letters, digits, _ - .")
-    return name
-
-
-Name = Annotated[
-    str,
-    Field(max_length=64, json_schema_extra={"pattern": f"^{_NAME.pattern}$"}),
-    AfterValidator(_speakable),
-]
-# strict: neither true nor "0.4" is a number
-Coordinate = Annotated[
-    float,
-    Field(strict=True, ge=-10, le=10, allow_inf_nan=False),
-    _no_more_than(10, _METRES),
-]
-Angle = Annotated[
-    float,
-    Field(strict=True, ge=-2 * math.pi, le=2 * math.pi, allow_inf_nan=False),
-    _no_more_than(2 * math.pi, _RADIANS),
-]
-Length = Annotated[
-    float,
-    Field(strict=True, ge=0.001, le=5, allow_inf_nan=False),
-    _no_more_than(5, _METRES),
-]
+from guided_lgp.scene.bodies import Body, Box, Coordinate, Obstacle, Table
+from guided_lgp.scene.shapes import Convex
 
 
 @dataclass(frozen=True)
 class Column:
-    """A body that is neither moved nor stood on: half extents (3,) in m, and pose (7,)."""
+    """What a raised robot stands on: an obstacle at a pose (7,)."""
 
-    half: tuple[float, float, float]
+    convex: Convex
     placement: Array
     name: str = "robot.column"
-    """No box or table can be called so."""
+    """No body of a scene can be called so."""
 
 
 class PlacedRobot(BaseModel):
@@ -125,8 +76,8 @@ class PlacedRobot(BaseModel):
         """What the robot stands on, where that is not the floor: an obstacle."""
         if not self.height:
             return ()
-        half = (*self.description.stand, self.height / 2)
-        return (Column(half, pose((*self.base[:2], self.height / 2), self.base[2])),)
+        convex = Convex("box", (*self.description.stand, self.height / 2))
+        return (Column(convex, pose((*self.base[:2], self.height / 2), self.base[2])),)
 
     def link_poses(self, q: Array, links: Sequence[str]) -> Array:
         """Poses (T, len(links), 7) of links' frames in the world (forward kinematics by pinocchio).
@@ -185,47 +136,56 @@ def grasp_axes(size: tuple[float, float, float], widest: float) -> tuple[int, ..
     return tuple(axis for axis in order if size[axis] <= widest)
 
 
-class Table(Document):
-    """A fixed support; ``position`` is the centre of its top (m), ``yaw`` in rad."""
-
-    name: Name
-    position: tuple[Coordinate, Coordinate, Coordinate]
-    half_extents: tuple[Length, Length]
-    yaw: Angle = 0.0
-
-
-class Box(Document):
-    """A movable box; ``position`` is its centre (m), ``size`` its full extents (m)."""
-
-    name: Name
-    size: tuple[Length, Length, Length]
-    position: tuple[Coordinate, Coordinate, Coordinate]
-    yaw: Angle = 0.0
-    on: Name
-
-
 class Scene(Document):
     """An initial configuration x_0 with its symbols, and the domain whose actions may be used."""
 
+    version: Literal[1, 2] = Field(default=1, exclude_if=lambda version: version == 1)
+    """Of the format; nothing depends on it."""
     name: str = "scene"
     domain: str = Field(default=PAPER, exclude_if=lambda name: name == PAPER)
     robot: PlacedRobot = Field(default_factory=PlacedRobot)
     tables: Annotated[tuple[Table, ...], Field(min_length=1)]
     boxes: Annotated[tuple[Box, ...], Field(min_length=1)]
 
+    obstacles: tuple[Obstacle, ...] = Field(default=(), exclude_if=lambda obstacles: not obstacles)
+
+    def __hash__(self) -> int:
+        """Cheap, since measures of scenes are cached; scenes of one name are told apart by ==."""
+        return hash(self.name)
+
+    @property
+    def movable(self) -> tuple[Box, ...]:
+        """The boxes that may be moved."""
+        return tuple(box for box in self.boxes if not box.fixed)
+
+    @property
+    def supports(self) -> tuple[Table | Box, ...]:
+        """What stays where it is and may be stood on: tables and fixed boxes."""
+        return (*self.tables, *(box for box in self.boxes if box.fixed))
+
+    @property
+    def in_the_way(self) -> tuple[Obstacle | Column, ...]:
+        """What is neither moved nor stood on."""
+        return (*self.robot.columns, *self.obstacles)
+
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """All bodies."""
+        return (*self.tables, *self.boxes, *self.obstacles)
+
     @property
     def symbols(self) -> Symbols:
         """The symbols of the scene by logic type, as declared."""
         return load_domain(self.domain).symbols(
             gripper=self.robot.description.grippers,
-            box=(box.name for box in self.boxes),
-            table=(table.name for table in self.tables),
+            box=(box.name for box in self.movable),
+            table=(support.name for support in self.supports),
         )
 
     @property
     def state(self) -> State:
         """The initial symbolic state."""
-        return load_domain(self.domain).state({box.name: box.on for box in self.boxes})
+        return load_domain(self.domain).state({box.name: box.on for box in self.movable})
 
     @field_validator("domain")
     @classmethod
@@ -237,7 +197,7 @@ class Scene(Document):
     @model_validator(mode="after")
     def _names(self) -> "Scene":
         robot = self.robot.description
-        names = [*(table.name for table in self.tables), *(box.name for box in self.boxes)]
+        names = [body.name for body in self.bodies]
         parts = {*robot.description.links, Column.name}
         taken = set(robot.grippers)
         for name in names:
@@ -246,32 +206,34 @@ class Scene(Document):
             if name in parts:
                 raise ValueError(f"name {name!r} is that of a part of the robot")
             taken.add(name)
-        for box in self.boxes:
-            if box.on not in names or box.on == box.name:
+        supports = {body.name for body in (*self.supports, *self.movable)}
+        for box in self.movable:
+            if box.on not in supports or box.on == box.name:
                 raise ValueError(f"box {box.name!r} stands on unknown table {box.on!r}")
         return self
 
 
-def parse_scene(document: object, where: str) -> Scene:
+def parse_scene(document: object, where: str, folder: Path = Path()) -> Scene:
     """Validate a scene document.
 
     Args:
         document: what ``json.load`` returned.
         where: the file, for the message.
+        folder: where the files of meshes are.
 
     Raises:
         InputError: the first fault found, with file and field.
     """
     try:
-        return Scene.model_validate(document)
+        return Scene.model_validate(document, context={"folder": folder})
     except ValidationError as error:
         raise first_fault(error, where) from None
 
 
 def load_scene(path: str | Path) -> Scene:
-    """Read a scene from a JSON file.
+    """Read a scene from a JSON file; meshes lie relative to it.
 
     Raises:
         InputError: the file is missing, is not JSON, or is not a scene.
     """
-    return parse_scene(read_json(Path(path)), str(path))
+    return parse_scene(read_json(Path(path)), str(path), Path(path).parent)

@@ -6,7 +6,7 @@ configuration while a good part of the action sequences cannot be carried out.
 
 from dataclasses import dataclass
 
-from guided_lgp.scene.model import Table
+from guided_lgp.scene.bodies import Table
 
 BOX_SIZE = (0.15, 0.07, 0.10)
 """Extents (m). The fingers close across the 7 cm; on a 12 cm high box no two others could stand."""

@@ -1,15 +1,15 @@
 """Checks of a scene that a user wrote by hand, before any planning."""
 
-import math
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 
 from guided_lgp.errors import InputError
-from guided_lgp.scene.footprints import footprint, gap, inset
-from guided_lgp.scene.model import Box, Scene, Table
+from guided_lgp.scene.bodies import TABLE_THICKNESS, Box, Table
+from guided_lgp.scene.footprints import footprint, gap, inset, seat
+from guided_lgp.scene.model import Scene
 from guided_lgp.scene.tolerances import FLOAT, OVERLAP
-from guided_lgp.scene.world import TABLE_THICKNESS, initial_poses, world_of
+from guided_lgp.scene.world import initial_poses, world_of
 
 
 def validate_scene(scene: Scene, where: str = "scene") -> None:
@@ -21,14 +21,17 @@ def validate_scene(scene: Scene, where: str = "scene") -> None:
 
     Raises:
         InputError: the first fault found: a joint out of range, tables that overlap each other or
-            the robot, boxes that overlap, float, sink in, stand in a circle, or would fall.
+            the robot, boxes that overlap, float, sink in, stand in a circle, or would fall, and
+            anything inside the robot.
     """
     _validate_robot(scene, where)
     _validate_tables(scene, where)
-    for index, box in enumerate(scene.boxes):
-        _validate_height(scene, box, f"{where}: boxes.{index} ({box.name})")
-    for index, box in enumerate(scene.boxes):
-        _validate_balance(scene, box, f"{where}: boxes.{index} ({box.name})")
+    _validate_robots_place(scene, where)
+    fields = {box.name: f"{where}: boxes.{i} ({box.name})" for i, box in enumerate(scene.boxes)}
+    for box in scene.movable:
+        _validate_height(scene, box, fields[box.name])
+    for box in scene.movable:
+        _validate_balance(scene, box, fields[box.name])
     _validate_overlaps(scene, where)
 
 
@@ -47,25 +50,27 @@ def _validate_tables(scene: Scene, where: str) -> None:
         apart = abs(one.position[2] - other.position[2]) >= TABLE_THICKNESS
         if not apart and gap(footprint(one), footprint(other)) < -OVERLAP:
             raise InputError(f"{where}: tables", f"{one.name} and {other.name} overlap")
+
+
+def _validate_robots_place(scene: Scene, where: str) -> None:
     world = world_of(scene)
-    for link in world.fixed_links:
-        for table in scene.tables:
-            depth = -world.distance(link, table.name, 0.0)
-            if depth > OVERLAP:
-                fault = f"{table.name} is {depth:.3f} m inside the robot ({link})"
-                raise InputError(f"{where}: tables", fault)
+    for link, body in product(world.fixed_links, (*scene.supports, *scene.obstacles)):
+        depth = -world.distance(link, body.name, 0.0)
+        if depth > OVERLAP:
+            field = {Table: "tables", Box: "boxes"}.get(type(body), "obstacles")
+            fault = f"{body.name} is {depth:.3f} m inside the robot ({link})"
+            raise InputError(f"{where}: {field}", fault)
 
 
 def _validate_height(scene: Scene, box: Box, where: str) -> None:
     seen, below = [box.name], box.on
-    supports = {other.name: other.on for other in scene.boxes}
+    supports = {other.name: other.on for other in scene.movable}
     while below in supports:
         if below in seen:
             raise InputError(f"{where}.on", f"{' on '.join([*seen, below])}: boxes in a circle")
         seen.append(below)
         below = supports[below]
-    support = _support(scene, box)
-    top = support.position[2] + (support.size[2] / 2 if isinstance(support, Box) else 0.0)
+    top = _support(scene, box).top[2]
     height = box.position[2] - box.size[2] / 2 - top
     if abs(height) > FLOAT:
         fault = f"floats {height:.3f} m above" if height > 0 else f"is sunk {-height:.3f} m into"
@@ -75,12 +80,14 @@ def _validate_height(scene: Scene, box: Box, where: str) -> None:
 
 def _validate_balance(scene: Scene, box: Box, where: str) -> None:
     """A stack falls where its common centre of mass is beside what carries it."""
+    if not box.convex.stands:
+        raise InputError(where, "the mesh has no flat base below its centre of mass")
     stack = [box]
     for lower in stack:  # grows while it is walked
-        stack += [other for other in scene.boxes if other.on == lower.name]
-    weights = [math.prod(other.size) for other in stack]
+        stack += [other for other in scene.movable if other.on == lower.name]
+    weights = [other.convex.volume for other in stack]
     centre = np.average([other.position[:2] for other in stack], axis=0, weights=weights)
-    beyond = -float(inset(footprint(_support(scene, box)), centre))
+    beyond = -float(inset(seat(_support(scene, box)), centre))
     if beyond > 0:
         carried = " and what it carries" if len(stack) > 1 else ""
         fault = f"the centre of mass of {box.name}{carried} is {beyond:.3f} m beside {box.on}"
@@ -88,14 +95,13 @@ def _validate_balance(scene: Scene, box: Box, where: str) -> None:
 
 
 def _support(scene: Scene, box: Box) -> Table | Box:
-    bodies: tuple[Table | Box, ...] = (*scene.tables, *scene.boxes)
-    return next(body for body in bodies if body.name == box.on)
+    return next(body for body in (*scene.supports, *scene.movable) if body.name == box.on)
 
 
 def _validate_overlaps(scene: Scene, where: str) -> None:
     world = world_of(scene)
     world.set(scene.robot.description.home, initial_poses(scene))
-    supports = {frozenset((box.name, box.on)) for box in scene.boxes}
+    supports = {frozenset((box.name, box.on)) for box in scene.movable}
     for overlap in world.penetrations(OVERLAP):
         if overlap.bodies not in supports:
             fault = f"{overlap.first} and {overlap.second} overlap by {overlap.depth:.3f} m"

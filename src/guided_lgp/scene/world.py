@@ -5,33 +5,18 @@ from dataclasses import dataclass
 from functools import lru_cache
 from itertools import combinations
 from types import TracebackType
+from typing import Any
 from weakref import finalize
 
 import numpy as np
 from numpy.typing import NDArray
 
-from guided_lgp.poses import Array, compose, pose
+from guided_lgp.poses import Array, compose
+from guided_lgp.scene.bodies import TABLE_THICKNESS, Body, Box, colour_of
 from guided_lgp.scene.bullet import pybullet
-from guided_lgp.scene.model import Scene, Table
+from guided_lgp.scene.model import Column, Scene
+from guided_lgp.scene.shapes import Convex, Vector
 from guided_lgp.scene.tolerances import MARGIN
-
-TABLE_THICKNESS = 0.04
-"""Tables and trays are slabs (m) under their top; what holds them up is left out."""
-
-COLOURS: dict[str, tuple[float, float, float]] = {
-    "red": (0.80, 0.16, 0.14),
-    "green": (0.20, 0.62, 0.24),
-    "blue": (0.13, 0.34, 0.75),
-    "yellow": (0.95, 0.78, 0.15),
-    "purple": (0.53, 0.27, 0.66),
-    "orange": (0.95, 0.52, 0.12),
-    "white": (0.92, 0.92, 0.92),
-    "black": (0.15, 0.15, 0.15),
-    "pink": (0.95, 0.58, 0.72),
-    "brown": (0.45, 0.28, 0.15),
-    "tray": (0.45, 0.45, 0.47),
-}
-"""Colour of a body named after it; RGB in 0..1."""
 
 _OTHER_BOX, _OTHER_TABLE = (0.25, 0.65, 0.68), (0.78, 0.66, 0.50)
 _LEGS, _FLOOR = (0.45, 0.42, 0.40), (0.93, 0.94, 0.95)
@@ -104,17 +89,16 @@ class World:
             pybullet.resetJointState(
                 self.robot, self.joints[joint], value, physicsClientId=self.client
             )
-        self.tables = {table.name: self._add_table(table) for table in scene.tables}
-        self.boxes = {box.name: self._add_box(box.name, box.size) for box in scene.boxes}
-        self._columns = {
-            column.name: self._add_body(0.0, column.half, column.placement, _LEGS)
-            for column in scene.robot.columns
+        self.supports = {body.name: self._add(body) for body in scene.supports}
+        self.boxes = {
+            box.name: self._add(box, _BOX_DENSITY * box.convex.volume) for box in scene.movable
         }
+        self._obstacles = {body.name: self._add(body) for body in scene.in_the_way}
         self._names: dict[tuple[int, int], str] = {
             (self.robot, index): link for link, index in self.links.items()
         }
         self._names |= {
-            (body, -1): n for n, body in (self.tables | self.boxes | self._columns).items()
+            (body, -1): n for n, body in (self.supports | self.boxes | self._obstacles).items()
         }
         self._parts = {name: part for part, name in self._names.items()}
         self._filter_pairs()
@@ -250,36 +234,19 @@ class World:
         )
         return min((float(point[8]) for point in points), default=limit)
 
-    def _add_table(self, table: Table) -> int:
-        half = (*table.half_extents, TABLE_THICKNESS / 2)
-        x, y, z = table.position
-        placement = pose((x, y, z - TABLE_THICKNESS / 2), table.yaw)
-        colour = COLOURS.get(table.name, _OTHER_TABLE)
-        return self._add_body(0.0, half, placement, colour)
-
-    def _add_box(self, name: str, size: tuple[float, float, float]) -> int:
-        half = (size[0] / 2, size[1] / 2, size[2] / 2)
-        mass = _BOX_DENSITY * float(np.prod(size))
-        return self._add_body(mass, half, pose((0, 0, 0)), COLOURS.get(name, _OTHER_BOX))
-
-    def _add_body(
-        self,
-        mass: float,
-        half: tuple[float, float, float],
-        placement: Array,
-        colour: tuple[float, float, float],
-    ) -> int:
-        shape = pybullet.createCollisionShape(
-            pybullet.GEOM_BOX, halfExtents=half, physicsClientId=self.client
-        )
+    def _add(self, body: Body | Column, mass: float = 0.0) -> int:
+        """Load a body where the scene has it; without a mass (kg), it never moves."""
         looks = pybullet.createVisualShape(
-            pybullet.GEOM_BOX,
-            halfExtents=half,
-            rgbaColor=(*colour, 1.0),
+            **_geometry(body.convex),
+            rgbaColor=(*_colour(body), 1.0),
             specularColor=(0.1, 0.1, 0.1),
             physicsClientId=self.client,
         )
-        body: int = pybullet.createMultiBody(
+        shape = pybullet.createCollisionShape(
+            **_geometry(body.convex, collision=True), physicsClientId=self.client
+        )
+        placement = body.placement
+        number: int = pybullet.createMultiBody(
             mass,
             shape,
             looks,
@@ -288,13 +255,13 @@ class World:
             physicsClientId=self.client,
         )
         pybullet.changeDynamics(
-            body,
+            number,
             -1,
             lateralFriction=_FRICTION,
             spinningFriction=_SPINNING_FRICTION,
             physicsClientId=self.client,
         )
-        return body
+        return number
 
     def _dress(self) -> None:
         """Colour the robot, put legs under the tables and a floor under it all: looks only."""
@@ -344,7 +311,7 @@ class World:
         for one, other in combinations(solid, 2):
             if not {one, other} & moving or frozenset((one, other)) in disabled:
                 self._ignore(self._parts[one], self._parts[other])
-        for body in (*self.tables.values(), *self._columns.values()):
+        for body in (*self.supports.values(), *self._obstacles.values()):
             for link in self.fixed_links:
                 self._ignore(self._parts[link], (body, -1))
 
@@ -366,4 +333,24 @@ def world_of(scene: Scene) -> World:
 
 def initial_poses(scene: Scene) -> dict[str, Array]:
     """Pose (7,) of every box at the start."""
-    return {box.name: pose(box.position, box.yaw) for box in scene.boxes}
+    return {box.name: box.placement for box in scene.movable}
+
+
+def _colour(body: Body | Column) -> Vector:
+    if isinstance(body, Column):
+        return _LEGS
+    other = _OTHER_BOX if isinstance(body, Box) and not body.fixed else _OTHER_TABLE
+    return colour_of(body) or other
+
+
+def _geometry(convex: Convex, collision: bool = False) -> dict[str, Any]:
+    """The arguments by which PyBullet takes a shape."""
+    if convex.shape == "mesh":
+        vertices = {"vertices": [list(vertex) for vertex in convex.vertices]}
+        faces = {} if collision else {"indices": convex.faces().ravel().tolist()}
+        return {"shapeType": pybullet.GEOM_MESH, **vertices, **faces}
+    if convex.shape == "cylinder":
+        radius, _, half = convex.half
+        height = {"height" if collision else "length": 2 * half}
+        return {"shapeType": pybullet.GEOM_CYLINDER, "radius": radius, **height}
+    return {"shapeType": pybullet.GEOM_BOX, "halfExtents": convex.half}

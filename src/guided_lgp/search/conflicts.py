@@ -36,7 +36,7 @@ class Conflicts:
         First the box of the last action alone, then with one other, the nearest first; then
         everything, of which one after the other is left out.
         """
-        every = Boxes(box.name for box in self._scene.boxes)
+        every = Boxes(box.name for box in self._scene.movable)
         own, others = self._stacks(skeleton)
         small = [own, *(own | other for other in others)]
         boxes = next((part for part in small if self._infeasible(part, skeleton)), every)
@@ -61,13 +61,13 @@ class Conflicts:
         body = self._bind(skeleton[-1]).body
         stacks = {
             stacked_with(skeleton, self._scene, box.name): None
-            for box in sorted(self._scene.boxes, key=lambda box: self._distance(body, box.name))
+            for box in sorted(self._scene.movable, key=lambda box: self._distance(body, box.name))
         }
         own = stacked_with(skeleton, self._scene, body)
         return own, [stack for stack in stacks if stack != own]
 
     def _distance(self, one: str, other: str) -> float:
-        places = {box.name: footprint(box) for box in self._scene.boxes}
+        places = {box.name: footprint(box) for box in self._scene.movable}
         return gap(places[one], places[other])
 
     def _infeasible(self, boxes: Boxes, skeleton: Skeleton) -> bool:

@@ -5,14 +5,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from guided_lgp.bounds.results import Array, Keyframe
-from guided_lgp.poses import pose, yaw_of
+from guided_lgp.poses import yaw_of
 from guided_lgp.scene import Scene
+from guided_lgp.scene.world import initial_poses
 
 
 def start(scene: Scene) -> Keyframe:
     """The configuration x_0: all arms at their side, boxes where the scene puts them."""
-    home = scene.robot.description.home
-    return Keyframe(home, {box.name: pose(box.position, box.yaw) for box in scene.boxes})
+    return Keyframe(scene.robot.description.home, initial_poses(scene))
 
 
 def observe(scene: Scene, keyframe: Keyframe) -> dict[str, Array]:
@@ -25,7 +25,7 @@ def observe_all(scene: Scene, keyframes: Sequence[Keyframe]) -> list[dict[str, A
     symbols = scene.symbols
     postures, which = np.unique([k.q for k in keyframes], axis=0, return_inverse=True)
     tools = scene.robot.tool_poses(postures, symbols.grippers)
-    surfaces = {table.name: np.array(table.position) for table in scene.tables}
+    surfaces = {body.name: np.array(body.top) for body in scene.supports}
     return [
         {name: tools[name][posture, :3] for name in symbols.grippers}
         | {name: np.asarray(keyframe.boxes[name])[:3] for name in symbols.boxes}
@@ -38,9 +38,9 @@ def shapes(scene: Scene, keyframe: Keyframe) -> dict[str, Array]:
     """Half extents (m) and yaw (rad), (4,), of every box and surface."""
     boxes = {
         box.name: np.array([*np.divide(box.size, 2), float(yaw_of(keyframe.boxes[box.name]))])
-        for box in scene.boxes
+        for box in scene.movable
     }
     surfaces = {
-        table.name: np.array([*table.half_extents, 0.0, table.yaw]) for table in scene.tables
+        body.name: np.array([*body.convex.half[:2], 0.0, body.yaw]) for body in scene.supports
     }
     return boxes | surfaces

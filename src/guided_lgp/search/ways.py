@@ -80,5 +80,5 @@ def _alone(scene: Scene, body: str) -> Scene:
     below = [body]
     while (support := scene.state.support_of(below[-1])) is not None:
         below.append(support)
-    boxes = tuple(box for box in scene.boxes if box.name in below)
+    boxes = tuple(box for box in scene.boxes if box.fixed or box.name in below)
     return scene.model_copy(update={"boxes": boxes})

@@ -98,12 +98,19 @@ class _Stage:
         self._place(box_path(name), box_pose)
 
     def _draw(self, body: Body) -> None:
-        shape = self._rerun.Boxes3D(
-            sizes=[body.size],
-            colors=[_rgb(body.colour)],
-            labels=[body.name] if body.name else None,
-            fill_mode="solid",
-        )
+        if body.convex.shape == "box":
+            shape = self._rerun.Boxes3D(
+                sizes=[body.convex.size],
+                colors=[_rgb(body.colour)],
+                labels=[body.name] if body.name else None,
+                fill_mode="solid",
+            )
+        else:
+            shape = self._rerun.Mesh3D(
+                vertex_positions=body.convex.points(),
+                triangle_indices=body.convex.faces(),
+                albedo_factor=_rgb(body.colour),
+            )
         self._stream.log(body.path, shape, static=True)
 
     def _place(self, path: str, transform: Array, static: bool = False) -> None:

@@ -85,14 +85,22 @@ class Viewer:
 
     def _add_tables_and_boxes(self) -> None:
         for body in fixed_bodies(self.scene):
-            self._add_box(body, cast_shadow=False)
+            self._add_body(body, cast_shadow=False)
         for body in movable_bodies(self.scene):
-            self._boxes[body.path] = self._add_box(body)
+            self._boxes[body.path] = self._add_body(body)
 
-    def _add_box(self, body: Body, **options: Any) -> Any:
+    def _add_body(self, body: Body, **options: Any) -> Any:
         """Draw a body, and beside it its name, which goes with it."""
-        scene = self.server.scene
-        node = scene.add_box(body.path, body.colour, body.size, **_pose(body.placement), **options)
+        scene, convex = self.server.scene, body.convex
+        options |= _pose(body.placement)
+        node: Any
+        if convex.shape == "box":
+            node = scene.add_box(body.path, body.colour, convex.size, **options)
+        else:
+            vertices, faces = convex.points(), convex.faces()
+            node = scene.add_mesh_simple(
+                body.path, vertices, faces, color=body.colour, flat_shading=True, **options
+            )
         if body.name:
             scene.add_label(
                 f"{body.path}/name",

@@ -26,8 +26,8 @@ from guided_lgp.policy.relational.model import Model, Weights
 from guided_lgp.policy.relational.network import RelationalNetwork
 from guided_lgp.policy.relational.samples import Examples
 from guided_lgp.policy.relational.training import fit
+from guided_lgp.scene import Box, Scene, Table
 from guided_lgp.scene.footprints import footprint, gap
-from guided_lgp.scene.model import Box, Scene, Table
 from guided_lgp.search.observation import observe, shapes, start
 
 SCENE = Scene(

@@ -147,7 +147,7 @@ class Formulator:
         context, gripper = self._context, configuration.held.gripper
         ends = (segment.joints for segment in configuration.segments)
         for joints in (configuration.joints, *ends):
-            for name in (*context.geometry.tables, *context.geometry.boxes):
+            for name in context.geometry.bodies:
                 if name != configuration.held.box and not context.at_side(name):
                     keep_clear(context, gripper, joints, name)
             for other in context.others(gripper):

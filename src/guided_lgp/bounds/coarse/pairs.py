@@ -86,7 +86,7 @@ _PROVED = "infeasible in the scene of these boxes alone"
 
 
 def _neighbours(scene: Scene) -> dict[str, set[str]]:
-    places = {box.name: footprint(box) for box in scene.boxes}
+    places = {box.name: footprint(box) for box in scene.movable}
     return {
         name: {other for other in places if other != name and gap(place, places[other]) <= _NEAR}
         for name, place in places.items()

@@ -30,7 +30,7 @@ def stacked_with(skeleton: Skeleton, scene: Scene, box: str) -> Boxes:
 
     Left out, they would take from it a support, or a counterweight.
     """
-    names, links, state = {box.name for box in scene.boxes}, set[Boxes](), scene.state
+    names, links, state = {box.name for box in scene.movable}, set[Boxes](), scene.state
     for action in (None, *skeleton):
         state = state if action is None else successor(state, action)
         links |= {frozenset(pair) for pair in state.support if names.issuperset(pair)}
@@ -69,7 +69,7 @@ class Parts:
     def _bound(self, boxes: Boxes) -> CoarseBound:
         if boxes not in self._bounds:
             self._world = self._world or World(self._scene)
-            kept = tuple(box for box in self._scene.boxes if box.name in boxes)
+            kept = tuple(b for b in self._scene.boxes if b.fixed or b.name in boxes)
             part = self._scene.model_copy(update={"boxes": kept})
             self._bounds[boxes] = CoarseBound(
                 part,

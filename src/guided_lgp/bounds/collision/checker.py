@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 
 from guided_lgp.bounds.collision.certificate import Certificate
 from guided_lgp.bounds.results import Array
-from guided_lgp.poses import IDENTITY, pose
+from guided_lgp.poses import IDENTITY
 from guided_lgp.robots import Arm
 from guided_lgp.scene import Scene
-from guided_lgp.scene.world import TABLE_THICKNESS
+from guided_lgp.scene.shapes import Convex
 
 PADDING = 0.003
 """Distance (m) that everything keeps from everything, declared contacts apart."""
@@ -71,26 +71,19 @@ class CollisionChecker:
         for joint in range(1, self._model.njoints):
             if self._model.parents[joint] == 0:
                 self._model.jointPlacements[joint] = base * self._model.jointPlacements[joint]
-        for column in scene.robot.columns:
-            sides = (2 * half for half in column.half)
-            self._add(column.name, 0, pin.XYZQUATToSE3(column.placement), coal.Box(*sides))
-        for table in scene.tables:
-            x, y, top = table.position
-            centre = pose((x, y, top - TABLE_THICKNESS / 2), table.yaw)
-            length, width = table.half_extents
-            slab = coal.Box(2 * length, 2 * width, TABLE_THICKNESS)
-            self._add(table.name, 0, pin.XYZQUATToSE3(centre), slab)
-        for box in scene.boxes:
-            self._add(box.name, 0, pin.XYZQUATToSE3(IDENTITY), coal.Box(*box.size))
+        for body in (*scene.in_the_way, *scene.supports):
+            self._add(body.name, 0, pin.XYZQUATToSE3(body.placement), _shape(body.convex))
+        for box in scene.movable:
+            self._add(box.name, 0, pin.XYZQUATToSE3(IDENTITY), _shape(box.convex))
         self._bodies: dict[str, list[int]] = {}
         for number, name in enumerate(self._names):
             self._bodies.setdefault(name, []).append(number)
         self._arm = {g: self._shapes(*arm.links, *arm.hand_links) for g, arm in robot.arms.items()}
         self._bodies |= {g: self._shapes(*arm.hand_links) for g, arm in robot.arms.items()}
-        self._boxes = {box.name for box in scene.boxes}
+        self._boxes = {box.name for box in scene.movable}
         self._tool = {gripper: self._tool_frame(arm) for gripper, arm in robot.arms.items()}
         self._candidates = self._candidate_pairs(
-            len(scene.tables) + len(scene.boxes), robot.disabled_pairs
+            len(scene.supports) + len(scene.movable), robot.disabled_pairs
         )
         self._pairs = np.nonzero(np.triu(self._candidates, 1))
         for first, second in zip(*self._pairs, strict=True):
@@ -329,6 +322,17 @@ def _robot_bodies(urdf: Path) -> tuple[tuple[Any, Any], ...]:
             shape = shape.convex
         bodies.append((body, shape))
     return tuple(bodies)
+
+
+def _shape(convex: Convex) -> Any:
+    """A body in coal."""
+    if convex.shape == "mesh":
+        vertices = coal.StdVec_Vec3s()
+        vertices.extend(np.array(vertex) for vertex in convex.vertices)
+        return coal.ConvexBase.convexHull(vertices, True, "Qt")
+    if convex.shape == "cylinder":
+        return coal.Cylinder(convex.half[0], 2 * convex.half[2])
+    return coal.Box(*(2 * half for half in convex.half))
 
 
 @cache

@@ -59,7 +59,7 @@ class PathBound:
         self._grips = {
             (gripper, box.name): grips_of(box, arm)
             for gripper, arm in self._mover.robot.arms.items()
-            for box in scene.boxes
+            for box in scene.movable
         }
         self._world = world_of(scene)
 

@@ -67,7 +67,7 @@ class PlacementSampler:
         self, index: int, situation: Situation, support: Array, reference: Array
     ) -> list[Array]:
         task, action = self._task, self._task.manoeuvres[index]
-        fixed = action.parent in task.tables
+        fixed = action.parent in task.supports
         poses = situation.boxes(task.arms)
         others = [
             (placement_of(support, poses[other]), task.half(other))
@@ -82,7 +82,7 @@ class PlacementSampler:
                 others.append((placement, task.half(later.body)))
         return alternatives(
             reference,
-            task.half(action.parent),
+            task.rest(action.parent),
             task.half(action.body),
             self._masses(index),
             others,
@@ -100,7 +100,7 @@ class PlacementSampler:
         for j in range(index, len(task) if later is None else later):
             bodies = (body, *task.states[j + 1].carried_by(body))
             poses = task.contacts[j].boxes
-            weights = np.array([np.prod(task.boxes[name].size) for name in bodies])
+            weights = np.array([task.boxes[name].convex.volume for name in bodies])
             relative = compose(inverse(poses[body]), np.array([poses[name] for name in bodies]))
             centres.append(weights @ relative[:, :2] / weights.sum())
         return np.array(centres)

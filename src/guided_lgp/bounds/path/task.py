@@ -126,8 +126,8 @@ class Task:
         self.goals = goals
         self.scene = scene
         self.rng = np.random.default_rng(np.random.SeedSequence([7, seed]))
-        self.boxes = {box.name: box for box in scene.boxes}
-        self.tables = {table.name: table for table in scene.tables}
+        self.boxes = {box.name: box for box in scene.movable}
+        self.supports = {body.name: body for body in scene.supports}
         self.grips = grips
         self.states = [scene.state]
         for action in skeleton:
@@ -219,15 +219,17 @@ class Task:
 
     def top(self, table: str, boxes: Mapping[str, Array]) -> Array:
         """Pose (7,) of the top of a table or box."""
-        if table in self.tables:
-            return pose(self.tables[table].position, self.tables[table].yaw)
+        if table in self.supports:
+            return pose(self.supports[table].top, self.supports[table].yaw)
         return compose(boxes[table], pose((0, 0, self.boxes[table].size[2] / 2)))
 
-    def half(self, body: str) -> Array:
-        """Half extents (2,) of the top of a table or box (m)."""
-        if body in self.tables:
-            return np.array(self.tables[body].half_extents)
-        return np.array(self.boxes[body].size[:2]) / 2
+    def rest(self, support: str) -> Array:
+        """Half extents (2,) of the part of a support's top that may carry (m)."""
+        return np.array((self.supports | self.boxes)[support].convex.rest)
+
+    def half(self, box: str) -> Array:
+        """Half extents (2,) of a box seen from above (m)."""
+        return np.array(self.boxes[box].convex.half[:2])
 
     def width(self, gripper: str, body: str, q: Array, boxes: Mapping[str, Array]) -> float:
         """Width (m) of a body between the fingers of a gripper at a configuration (n,)."""

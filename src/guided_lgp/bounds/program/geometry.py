@@ -1,16 +1,16 @@
 """Bodies of a scene and where they are at first, in the robot's frame."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from guided_lgp.bounds.results import Array
-from guided_lgp.poses import inverse, yaw_of
+from guided_lgp.poses import apply, inverse, pose, yaw_of
 from guided_lgp.scene import Scene
+from guided_lgp.scene.bodies import Body
 from guided_lgp.scene.model import grasp_axes
-from guided_lgp.scene.world import TABLE_THICKNESS
+from guided_lgp.scene.shapes import Vector
 
 
 @dataclass(frozen=True)
@@ -28,11 +28,14 @@ class Margins:
 
 
 @dataclass(frozen=True)
-class Body:
-    """A box or table: half extents (m)."""
+class LevelBody:
+    """A body as the program sees it: the level box around it."""
 
     name: str
     half: tuple[float, float, float]
+    """Half extents (m)."""
+    rest: tuple[float, float]
+    """Half extents (m) of the part of its top above which centres of mass may be."""
     mass: float
 
 
@@ -56,28 +59,20 @@ class SceneGeometry:
         to_robot = inverse(scene.robot.base_pose)
         self._turn = float(yaw_of(to_robot))
         self._shift = to_robot[:3]
-        self.bodies: dict[str, Body] = {}
+        self.bodies: dict[str, LevelBody] = {}
         self.poses: dict[str, tuple[float, float, float, float]] = {}
-        for table in scene.tables:
-            half = (*table.half_extents, TABLE_THICKNESS / 2)
-            self._add(table.name, half, table.position, table.yaw, -TABLE_THICKNESS / 2)
-        for box in scene.boxes:
-            sx, sy, sz = box.size
-            self._add(box.name, (sx / 2, sy / 2, sz / 2), box.position, box.yaw, 0.0)
-        self.tables = tuple(table.name for table in scene.tables)
-        self.boxes = tuple(box.name for box in scene.boxes)
+        self.supports = tuple(map(self._add, scene.supports))
+        """What stays where it is and may be stood on."""
+        self.boxes = tuple(map(self._add, scene.movable))
+        """What may be moved."""
+        self.obstacles = tuple(map(self._add, scene.obstacles))
 
-    def _add(
-        self,
-        name: str,
-        half: tuple[float, float, float],
-        position: Sequence[float],
-        yaw: float,
-        raised: float,
-    ) -> None:
-        x, y, z = position
-        self.bodies[name] = Body(name, half, 8 * half[0] * half[1] * half[2])
-        self.poses[name] = (*self.in_robot(x, y, yaw), z + raised + float(self._shift[2]))
+    def _add(self, body: Body) -> str:
+        half, (x, y, z), yaw = level_box(body)
+        convex = body.convex
+        self.bodies[body.name] = LevelBody(body.name, half, convex.rest, convex.volume)
+        self.poses[body.name] = (*self.in_robot(x, y, yaw), z + float(self._shift[2]))
+        return body.name
 
     def in_robot(self, x: float, y: float, yaw: float) -> tuple[float, float, float]:
         """x, y and yaw in the robot's frame of a place in the world."""
@@ -102,3 +97,21 @@ class SceneGeometry:
         hx, hy, hz = self.bodies[name].half
         sides = GraspSide(np.pi / 2, hy, 2 * hx), GraspSide(0.0, hx, 2 * hy)
         return tuple(sides[axis] for axis in grasp_axes((2 * hx, 2 * hy, 2 * hz), widest))
+
+
+def level_box(body: Body) -> tuple[Vector, Vector, float]:
+    """Half extents, centre (m) and yaw (rad) of a level box around a body."""
+    x, y, z, *turn = (float(value) for value in body.placement)
+    if turn[0] == turn[1] == 0.0:
+        return body.convex.half, (x, y, z), body.yaw
+    yaw = float(yaw_of(body.placement))
+    level = pose((x, y, z), yaw)
+    points = apply(inverse(level), apply(body.placement, body.convex.points()))
+    low, high = points.min(axis=0), points.max(axis=0)
+    centre = apply(level, (low + high) / 2)
+    return _vector((high - low) / 2), _vector(centre), yaw
+
+
+def _vector(array: Array) -> Vector:
+    x, y, z = (float(value) for value in array)
+    return x, y, z

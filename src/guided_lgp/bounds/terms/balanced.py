@@ -1,6 +1,5 @@
 """``balanced(box, support)``: the centres of mass of a stack are above what supports it."""
 
-import math
 from collections.abc import Mapping
 
 import casadi as ca
@@ -31,8 +30,8 @@ def _kernels(robot: RobotKinematics) -> tuple[Kernel, ...]:
 
 def inner(context: Context, support: str) -> tuple[float, float]:
     """Half extents (m) of the part of a support's top in which a centre of mass may be."""
-    half, margin = context.half(support), context.margins.balanced
-    return max(half[0] - margin, _LEAST), max(half[1] - margin, _LEAST)
+    (along, across), margin = context.geometry.bodies[support].rest, context.margins.balanced
+    return max(along - margin, _LEAST), max(across - margin, _LEAST)
 
 
 def _add(context: Context, box: str, support: str) -> None:
@@ -63,7 +62,7 @@ def _rows(context: Context, stack: tuple[str, ...], support: str) -> None:
 def check(
     box: str,
     boxes: Mapping[str, Pose],
-    sizes: Mapping[str, Vector],
+    masses: Mapping[str, float],
     support: Mapping[str, str],
     top: Top,
 ) -> float:
@@ -72,11 +71,11 @@ def check(
     Args:
         box: at the bottom of the stack.
         boxes: poses of all boxes.
-        sizes: their extents (m).
+        masses: of all of them, in any unit.
         support: what each stands on.
         top: of the box's support.
     """
-    x, y, _ = _centre_of_mass(box, boxes, sizes, support)
+    x, y, _ = _centre_of_mass(box, boxes, masses, support)
     offset, axes = (x - top.pose[0], y - top.pose[1], 0.0), axes_of(top.pose)
     return max(abs(dot(offset, axes[axis])) - top.half[axis] + BALANCE_INSET for axis in (0, 1))
 
@@ -92,15 +91,15 @@ def whole_stack(box: str, support: Mapping[str, str]) -> list[str]:
 def _centre_of_mass(
     box: str,
     boxes: Mapping[str, Pose],
-    sizes: Mapping[str, Vector],
+    masses: Mapping[str, float],
     support: Mapping[str, str],
 ) -> Vector:
-    """Of the box and everything it carries; boxes are equally dense."""
+    """Of the box and everything it carries."""
     if box not in support.values():
         x, y, z = boxes[box][:3]
         return x, y, z
     group = whole_stack(box, support)
-    weights = [math.prod(sizes[name]) for name in group]
+    weights = [masses[name] for name in group]
     x, y, z = (
         sum(w * boxes[name][axis] for w, name in zip(weights, group, strict=True)) / sum(weights)
         for axis in range(3)

@@ -59,8 +59,9 @@ def _add(context: Context, box: str, support: str | None = None) -> None:
     """Of a box, with all that it carries, on its support."""
     moved = (box, *context.state.carried_by(box))
     support = support or context.state.support_of(box)
+    geometry = context.geometry
     for name in moved:
-        for other in (*context.geometry.boxes, *context.geometry.tables):
+        for other in (*geometry.boxes, *geometry.supports, *geometry.obstacles):
             if other in moved or other == support or context.at_side(other):
                 continue
             if _neighbours(context, name, other):

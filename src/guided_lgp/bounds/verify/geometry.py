@@ -3,7 +3,7 @@
 import math
 from collections.abc import Collection, Mapping
 
-from guided_lgp.bounds.checks import Pose, Vector, Violation, box_sizes, top_of
+from guided_lgp.bounds.checks import Pose, Vector, Violation, box_sizes, top_of, volumes
 from guided_lgp.bounds.terms import balanced, hold, pads, stand
 from guided_lgp.robots import Arm, Robot
 from guided_lgp.scene import Scene
@@ -46,13 +46,13 @@ def placement_faults(
 
     Near an edge, a stack that nobody has touched may stay as the scene has it.
     """
-    sizes = box_sizes(scene)
+    sizes, masses = box_sizes(scene), volumes(scene)
     found = []
     for box, below in support.items():
         top = top_of(scene, boxes, below)
         excess = {
             "stand": stand.check(sizes[box], boxes[box], top),
-            "balanced": balanced.check(box, boxes, sizes, support, top),
+            "balanced": balanced.check(box, boxes, masses, support, top),
         }
         if excess["balanced"] > 0 and _untouched(scene, box, boxes, support):
             excess["balanced"] -= BALANCE_INSET

@@ -13,9 +13,10 @@ from pydantic import Field
 
 from guided_lgp.logic import Goal, Objective
 from guided_lgp.poses import Array
+from guided_lgp.scene.bodies import Box, Table
 from guided_lgp.scene.families.family import Drawn, Family, Layout
 from guided_lgp.scene.footprints import footprint, gap, inset
-from guided_lgp.scene.model import Box, Scene, Table
+from guided_lgp.scene.model import Scene
 
 Length = Annotated[float, Field(gt=0, le=1)]
 
