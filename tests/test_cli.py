@@ -15,7 +15,10 @@ import yaml
 from typer.main import get_command
 
 from guided_lgp import __version__, cache, cli, doctor
+from guided_lgp.bounds.plan_file import read_plan
+from guided_lgp.bounds.verify import verify_path
 from guided_lgp.errors import InputError, WorkerError, pybullet_remedy
+from guided_lgp.scene.world import world_of
 
 ROOT = Path(__file__).parents[1]
 SCENE = ROOT / "examples" / "three_boxes.json"
@@ -313,6 +316,22 @@ def test_goals_that_hold_already_are_a_plan_of_no_actions(
         cli.main(["plan", str(SCENE), "--goal", "(on red tab1)"])
     assert ended.value.code in (0, None)
     assert capsys.readouterr().out == "the goals hold already\n"
+
+
+def test_the_plan_of_no_actions_is_written_like_any_other(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, page = tmp_path / "plan.json", tmp_path / "plan.html"
+    words = ["plan", str(SCENE), "--goal", "(on red tab1)", "--execute"]
+    with pytest.raises(SystemExit) as ended:
+        cli.main([*words, "--out", str(out), "--html", str(page)])
+    assert ended.value.code in (0, None)
+    first, physics, *written = capsys.readouterr().out.splitlines()
+    assert (first, physics) == ("the goals hold already", "physics: all goals hold")
+    assert written == [f"written: {out}", f"written: {page}"]
+    plan = read_plan(out)
+    assert (plan.actions, plan.objective) == ((), ("(on red tab1)",))
+    assert verify_path(world_of(plan.scene), plan.skeleton, plan.trajectory).violation is None
 
 
 def test_a_limit_of_time_ends_the_search_with_a_reason(

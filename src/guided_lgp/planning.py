@@ -9,6 +9,7 @@ from pathlib import Path
 
 from guided_lgp.bounds.deadline import Deadline
 from guided_lgp.bounds.goals import GoalTerms
+from guided_lgp.bounds.path.assembly import stay
 from guided_lgp.bounds.results import PathResult
 from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.domains import load_domain
@@ -149,7 +150,7 @@ def plan(
     check_objective(goals, scene.symbols)
     misplaced = _misplaced(scene, goals)
     if goals and satisfied(scene.state, goals) and not misplaced:
-        return _without_search(scene, goals, PathResult((), feasible=True))
+        return _without_search(scene, goals, stay(scene))
     params = params or load_planning()
     deadline = Deadline.after(timeout)
     scene_bounds = SceneBounds(scene, params.bounds, deadline, goals)

@@ -4,7 +4,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -17,6 +17,9 @@ from guided_lgp.errors import InputError
 from guided_lgp.paths import MODELS, PLANNING
 from guided_lgp.policy.registry import DEFAULT_POLICY, POLICIES
 from guided_lgp.search.planners import DEFAULT_SEARCH, SEARCHES
+
+if TYPE_CHECKING:
+    from guided_lgp.planning import PlanningResult
 
 app = typer.Typer()
 
@@ -197,18 +200,8 @@ def plan(
         "statistics": statistics,
     }
     path = result.path
-    if path is not None and not path.skeleton:
-        text = json.dumps(summary, indent=1) if as_json else "the goals hold already"
-        typer.echo(text, err=piped)
-        return
     if path is None or path.trajectory is None:
-        if as_json:
-            typer.echo(json.dumps(summary, indent=1))
-        typer.echo(f"no plan: {result.explanation}", err=True)
-        for obstacle in result.obstacles[1:3]:
-            typer.echo(f"also infeasible: {obstacle}", err=True)
-        if hint := _HINTS.get(result.reason):
-            typer.echo(f"hint: {hint}", err=True)
+        _say_why_not(result, summary, as_json)
         raise typer.Exit(1)
     physics = None
     if execute:
@@ -231,15 +224,31 @@ def plan(
         return
     if piped:
         return
-    show(["", "action"], [(str(k), str(a)) for k, a in enumerate(path.skeleton, 1)])
-    typer.echo(f"motion of {path.trajectory.times[-1]:.1f} s, found in {sum(times.values()):.1f} s")
-    guide = f"policy {policy}, weights {statistics['weights']}; " if statistics["policy"] else ""
-    typer.echo(f"with: {guide}limits {statistics['limits']}")
+    if path.skeleton:
+        show(["", "action"], [(str(k), str(a)) for k, a in enumerate(path.skeleton, 1)])
+        duration = path.trajectory.times[-1]
+        typer.echo(f"motion of {duration:.1f} s, found in {sum(times.values()):.1f} s")
+        guide = (
+            f"policy {policy}, weights {statistics['weights']}; " if statistics["policy"] else ""
+        )
+        typer.echo(f"with: {guide}limits {statistics['limits']}")
+    else:
+        typer.echo("the goals hold already")
     if physics is not None:
         fault = physics["fault"] or f"goals: {physics['goals']}"
         typer.echo(f"physics: {'all goals hold' if physics['success'] else fault}")
     for file in filter(None, (out, html)):
         typer.echo(f"written: {file}")
+
+
+def _say_why_not(result: "PlanningResult", summary: Mapping[str, object], as_json: bool) -> None:
+    if as_json:
+        typer.echo(json.dumps(summary, indent=1))
+    typer.echo(f"no plan: {result.explanation}", err=True)
+    for obstacle in result.obstacles[1:3]:
+        typer.echo(f"also infeasible: {obstacle}", err=True)
+    if hint := _HINTS.get(result.reason):
+        typer.echo(f"hint: {hint}", err=True)
 
 
 def _origin(path: Path, shipped: Path) -> str:

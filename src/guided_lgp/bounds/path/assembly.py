@@ -1,21 +1,37 @@
 """From the steps of a solution to one trajectory of all moving joints."""
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 
 from guided_lgp.bounds.path.motions import Motion
-from guided_lgp.bounds.path.situation import Attach, Fingers, Release, Situation, Step
+from guided_lgp.bounds.path.situation import (
+    Attach,
+    Fingers,
+    Release,
+    Situation,
+    Step,
+    situation_at_start,
+)
 from guided_lgp.bounds.path.timing import INTERVAL
-from guided_lgp.bounds.results import Array, Attachment, Trajectory
+from guided_lgp.bounds.results import Array, Attachment, PathResult, Trajectory
 from guided_lgp.robots import Fingers as FingerJoints
 from guided_lgp.robots import Robot
+from guided_lgp.scene import Scene
 
 _FINGER_SHARE = 0.9
 """Share of their velocity limit at which fingers move."""
 
 _CAREFUL = 3.0
 """How many times slower an arm moves that carries boxes on a box: at full acceleration they tip."""
+
+
+def stay(scene: Scene) -> PathResult:
+    """The plan of no actions: the robot rests where it is for an interval."""
+    start = assemble(scene.robot.description, situation_at_start(scene), ())
+    rest = replace(start, times=np.array([0.0, INTERVAL]), q=np.tile(start.q, (2, 1)))
+    return PathResult((), feasible=True, trajectory=rest)
 
 
 def assemble(robot: Robot, start: Situation, steps: Iterable[Step]) -> Trajectory:

@@ -12,6 +12,8 @@ from guided_lgp.bounds.results import Array, Keyframe
 from guided_lgp.logic import State
 from guided_lgp.poses import compose, inverse
 from guided_lgp.robots import PlacedArm
+from guided_lgp.scene import Scene
+from guided_lgp.scene.world import initial_poses
 
 
 @dataclass(frozen=True)
@@ -104,6 +106,13 @@ class Situation:
     def _held_contacts(self) -> frozenset[frozenset[str]]:
         """A hand touches the box that it holds, and a box what stands on it."""
         return frozenset(frozenset((box, gripper)) for box, gripper in self.state.held)
+
+
+def situation_at_start(scene: Scene, upright: frozenset[str] = frozenset()) -> Situation:
+    """Where a plan begins: the arms at their side, the hands closed."""
+    robot = scene.robot.description
+    fingers = {gripper: arm.fingers.closed for gripper, arm in robot.arms.items()}
+    return Situation(scene.state, robot.home, fingers, initial_poses(scene), {}, upright)
 
 
 def tool_pose(arm: PlacedArm, q: Array) -> Array:

@@ -10,14 +10,13 @@ from guided_lgp.bounds.checks import closing_axis
 from guided_lgp.bounds.goals import GoalTerms
 from guided_lgp.bounds.path.grips import Grips
 from guided_lgp.bounds.path.motions import Motion, Mover, Surroundings, Tool, Transit
-from guided_lgp.bounds.path.situation import Situation, Step, tool_pose
+from guided_lgp.bounds.path.situation import Situation, Step, situation_at_start, tool_pose
 from guided_lgp.bounds.path.steps import manoeuvre
 from guided_lgp.bounds.results import Array, Keyframe
 from guided_lgp.logic import Skeleton, successor
 from guided_lgp.poses import compose, pose
 from guided_lgp.robots import PlacedArm
 from guided_lgp.scene import Scene
-from guided_lgp.scene.world import initial_poses
 
 _SHIFTS = (0.0, 0.25, -0.25, 0.5, -0.5)
 """Turns of the redundant joint (rad) on the straight way off a box that are tried."""
@@ -132,14 +131,7 @@ class Task:
         self.states = [scene.state]
         for action in skeleton:
             self.states.append(successor(self.states[-1], action))
-        self.start = Situation(
-            scene.state,
-            mover.robot.home,
-            {gripper: arm.fingers.closed for gripper, arm in mover.robot.arms.items()},
-            initial_poses(scene),
-            {},
-            goals.upright,
-        )
+        self.start = situation_at_start(scene, goals.upright)
 
     def __len__(self) -> int:
         return len(self.manoeuvres)
