@@ -18,8 +18,10 @@ from guided_lgp.explanation import ObservedBounds, Obstacle
 from guided_lgp.logic import (
     Goal,
     Objective,
+    Skeleton,
     least_actions,
     parse_objective,
+    progress,
     satisfied,
 )
 from guided_lgp.logic.objectives import asks_for_places, check_objective
@@ -37,6 +39,7 @@ from guided_lgp.scene.goals import complete_objective, in_the_way
 from guided_lgp.scene.validate import validate_scene
 from guided_lgp.scene.world import initial_poses
 from guided_lgp.search.facts import out_of_reach
+from guided_lgp.search.given import read_skeleton
 from guided_lgp.search.planners import (
     DEFAULT_SEARCH,
     SEARCHES,
@@ -46,7 +49,7 @@ from guided_lgp.search.planners import (
 )
 from guided_lgp.search.policy import Policy
 from guided_lgp.search.problem import Problem
-from guided_lgp.search.result import REASONS, Cause, SearchResult, Times
+from guided_lgp.search.result import REASONS, Cause, Run, SearchResult, Times
 from guided_lgp.search.ways import widened_scene
 
 SEQUENCES_PER_ACTION = 100
@@ -109,6 +112,8 @@ def plan(
     max_nodes: int | None = None,
     timeout: float | None = None,
     domain: str | None = None,
+    skeleton: str | Skeleton = (),
+    candidates: int = 1,
     where: str = "scene",
 ) -> PlanningResult:
     """Find a sequence of actions and its motion such that all goals hold at the end.
@@ -127,6 +132,10 @@ def plan(
         timeout: seconds of wall clock after which the search ends.
         domain: whose instructions the plan may have. By default that of the scene; where the scene
             names none, the paper's, or one that extends it if facts show that a goal needs it.
+        skeleton: actions with which the plan begins, also as text; or a file with them: a plan, or
+            one action a line. If the goals hold after them, or there are none, they are the plan.
+        candidates: how many plans to compare at most: the result is the one of the fewest actions,
+            of several the one of the shortest duration.
         where: the scene's file, for messages.
 
     Returns:
@@ -144,36 +153,48 @@ def plan(
     chosen = domain is not None or "domain" in scene.model_fields_set
     if domain is not None:
         scene = scene.model_copy(update={"domain": load_domain(domain).name})
-    goals = parse_objective([objective] if isinstance(objective, str) else map(str, objective))
     validate_scene(scene, where)
-    goals = complete_objective(goals, scene)
-    check_objective(goals, scene.symbols)
+    texts = [objective] if isinstance(objective, str) else map(str, objective)
+    goals = complete_objective(parse_objective(texts), scene)
+    prefix = read_skeleton(skeleton, scene.symbols, scene.state)
+    if goals or not prefix:
+        check_objective(goals, scene.symbols)
     misplaced = _misplaced(scene, goals)
-    if goals and satisfied(scene.state, goals) and not misplaced:
+    if not prefix and satisfied(scene.state, goals) and not misplaced:
         return _without_search(scene, goals, stay(scene))
+    if (prefix or misplaced) and not SEARCHES[planner].over_sequences:
+        accepted = ", ".join(name for name, search in SEARCHES.items() if search.over_sequences)
+        raise InputError("planner", f"{planner} knows neither sequences nor places", accepted)
     params = params or load_planning()
     deadline = Deadline.after(timeout)
     scene_bounds = SceneBounds(scene, params.bounds, deadline, goals)
     if fact := out_of_reach(scene, scene_bounds.facts, goals):
         return _without_search(scene, goals, None, fact)
-    limits = _limits(params.compare_scalability, scene, goals, max_nodes)
     search, followed = _guidance(planner, policy, models, scene)
-    observed = ObservedBounds(scene_bounds)
     problem = Problem(
         scene,
         goals,
-        limits,
-        observed,
+        _limits(params.compare_scalability, scene, goals, prefix, max_nodes),
+        ObservedBounds(scene_bounds),
         followed,
-        misplaced=misplaced,
         parts=scene_bounds,
+        misplaced=misplaced,
+        prefix=prefix,
+        candidates=candidates,
         deadline=deadline,
     )
     attempts = _Attempts(problem)
-    if chosen:
-        return attempts.result(search.plan(attempts.first))
-    widened = partial(attempts.widened, params.bounds)
-    return attempts.result(search.plan(replace(attempts.first, widened=widened)))
+    if prefix and satisfied(progress(scene.state, prefix), goals):
+        return attempts.result(_only_timed(problem))
+    if not chosen:
+        problem = replace(problem, widened=partial(attempts.widened, params.bounds))
+    return attempts.result(search.plan(problem))
+
+
+def _only_timed(problem: Problem) -> SearchResult:
+    """The geometry of a sequence that is given as a whole."""
+    run = Run(problem)
+    return run.result(1, None if run.solve(problem.prefix) else "given")
 
 
 class _Attempts:
@@ -240,14 +261,16 @@ def _limits(
     limits: SearchLimits,
     scene: Scene,
     goals: Objective,
+    prefix: Skeleton,
     max_nodes: int | None,
 ) -> SearchLimits:
     """Limits that follow the task: those of the experiments, or more where it needs more."""
-    lower_bound = least_actions(scene.state, goals, scene.symbols)
+    state = progress(scene.state, prefix)
+    lower_bound = least_actions(state, goals, scene.symbols)
     least = 0 if math.isinf(lower_bound) else int(lower_bound)
     least = max(least, 2) if asks_for_places(goals, scene.symbols) else least
     changed = {
-        "max_depth": max(limits.max_depth, 2 * least),
+        "max_depth": max(limits.max_depth, len(prefix) + 2 * least),
         "max_sequences": limits.max_sequences + SEQUENCES_PER_ACTION * least,
         "max_tree_size": max_nodes or limits.max_tree_size,
     }

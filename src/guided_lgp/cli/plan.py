@@ -46,8 +46,9 @@ def plan(
             '"(held BOX)", "(heldby BOX GRIPPER)", "(empty GRIPPER)", "(handempty)", "(at BOX X Y '
             'Z YAW)", "(in BOX TABLE X0 Y0 X1 Y1)", a region of the top, or "(upright BOX)" on the '
             "way. Once for each goal.",
+            show_default="none: only with --skeleton",
         ),
-    ],
+    ] = [],  # noqa: B006
     planner: Annotated[
         str,
         typer.Option(
@@ -77,6 +78,24 @@ def plan(
             show_default="that of SCENE; or else the paper's, and more where a goal needs them",
         ),
     ] = None,
+    skeleton: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ACTIONS|FILE",
+            help="Actions with which the plan begins: as text, or in a plan or a file with one a "
+            "line. If the goals hold after them, or there are none, only their motion is planned.",
+            show_default="none",
+        ),
+    ] = None,
+    candidates: Annotated[
+        int,
+        typer.Option(
+            min=1,
+            metavar="N",
+            help="Look for up to N plans and take the one of the fewest actions, of several the "
+            "one of the shortest duration.",
+        ),
+    ] = 1,
     max_nodes: Annotated[
         int | None,
         typer.Option(
@@ -173,6 +192,8 @@ def plan(
             max_nodes=max_nodes,
             timeout=timeout,
             domain=domain,
+            skeleton=skeleton or (),
+            candidates=candidates,
             where=str(scene),
         )
     start, objective = result.scene, result.objective

@@ -65,9 +65,8 @@ def search(
     sequence whose coarse bound is infeasible is pruned when its turn comes, with all that begins
     with it. Complete up to ``limits.max_depth``: whatever has a feasible sequence is found, unless
     another limit ends the search before. Equal ranks: older first. What is known to be infeasible
-    is not tried.
+    is not tried. Where several candidates are asked for, it goes on for others as short.
     """
-    max_depth = tree.problem.limits.max_depth
     knowledge = knowledge or NothingKnown()
 
     def entry(node: Node) -> tuple[Rank, int, Node]:
@@ -89,10 +88,11 @@ def search(
             continue
         satisfied = tree.satisfied(node)
         if satisfied and tree.run.solve(node.skeleton):
-            return tree.result()
-        if tree.goes_on(satisfied) and len(node.skeleton) < max_depth:
+            if tree.run.enough:
+                return tree.result()
+        elif tree.goes_on(satisfied) and len(node.skeleton) < tree.max_depth:
             estimate.expanded(node)
             for child in tree.expand(node, configuration):
-                if estimate.least_length(child) <= max_depth:
+                if estimate.least_length(child) <= tree.max_depth:
                     heappush(frontier, entry(child))
     return tree.result("exhausted")

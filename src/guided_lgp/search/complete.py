@@ -16,11 +16,11 @@ def plan(problem: Problem) -> SearchResult:
     Complete up to ``limits.max_depth``, unless another limit ends the search before.
     """
     tree = SkeletonTree(problem)
-    least = least_actions(problem.scene.state, problem.objective, problem.symbols)
-    depth = min(2 * least + 2, problem.limits.max_depth)
+    least = least_actions(tree.root.state, problem.objective, problem.symbols)
+    depth = min(len(problem.prefix) + 2 * least + 2, problem.limits.max_depth)
     result = guided.search(tree, int(depth))
-    if result.reason not in ("attempts", "exhausted"):  # within the depth of an attempt
-        return result
-    if (wider := problem.widened()) is not None:
+    if tree.run.enough or result.reason not in (None, "attempts", "exhausted"):
+        return result  # what is exhausted is so within the depth of an attempt
+    if not result.solved and (wider := problem.widened()) is not None:
         return joined(result, best_first.plan(wider))
     return best_first.search(tree, PolicyEstimate(problem))

@@ -29,9 +29,10 @@ def search(tree: SkeletonTree, max_depth: int) -> SearchResult:
             return tree.result(limit)
         node = _take_most_probable(unexplored, excluded)
         cause = _attempt(node, tree, unexplored, excluded, max_depth)
-        if cause is None:
+        if tree.run.enough:
             return tree.result()
-        tree.run.attempt_failed(cause)
+        if cause is not None:
+            tree.run.attempt_failed(cause)
     return tree.result("attempts" if unexplored else "exhausted")
 
 

@@ -25,6 +25,8 @@ class Search:
     summary: str
     """What it does, for the help of the command line."""
     follows_policy: bool = False
+    over_sequences: bool = True
+    """Whether it keeps sequences apart that lead to one state, and may begin with a given one."""
 
     def plan(self, problem: "Problem") -> "SearchResult":
         """Search for a plan."""
@@ -43,8 +45,10 @@ SEARCHES: Mapping[str, Search] = {
         "the policy, but going back to any other action where needed",
         follows_policy=True,
     ),
-    "breadth-first": Search("breadth_first:plan", "without a policy, as the original LGP"),
-    "graph": Search("graph:plan", "breadth-first over distinct states"),
+    "breadth-first": Search(
+        "breadth_first:plan", "without a policy, as the original LGP", over_sequences=False
+    ),
+    "graph": Search("graph:plan", "breadth-first over distinct states", over_sequences=False),
     "astar": Search("best_first:plan_shortest", "A* with landmark-cut, without a policy"),
     "facts": Search("best_first:plan_with_facts", "A* with facts of the geometry"),
     "facts-tuned": Search("best_first:plan_tuned", "facts, with a hand-made estimate"),

@@ -4,7 +4,15 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from guided_lgp.bounds.deadline import NEVER, Deadline
-from guided_lgp.logic import Objective, Skeleton, Symbols, successor, validate_objective
+from guided_lgp.logic import (
+    Objective,
+    Skeleton,
+    Symbols,
+    progress,
+    satisfied,
+    successor,
+    validate_objective,
+)
 from guided_lgp.params import SearchLimits
 from guided_lgp.scene import Scene
 from guided_lgp.search.bounds import Bounds, NoParts, Parts
@@ -35,13 +43,19 @@ class Problem:
     misplaced: Mapping[str, frozenset[str]] = field(default_factory=dict)
     """Bodies that every plan moves, whatever the symbols say, since the goals ask for places; for
     each, the bodies that stand there at the start."""
+    prefix: Skeleton = ()
+    """With which every plan begins; for the searches over a tree of sequences."""
+    candidates: int = 1
+    """How many plans to compare, at most: the shortest, and of these the fastest, is the result."""
     deadline: Deadline = NEVER
     """When the search ends, for users."""
     widened: Callable[[], "Problem | None"] = lambda: None
     """The same task with further instructions, if one of its goals needs them."""
 
     def __post_init__(self) -> None:
-        validate_objective(self.objective, self.symbols, self.scene.state)
+        state = progress(self.scene.state, self.prefix)
+        if not self.prefix or not satisfied(state, self.objective):
+            validate_objective(self.objective, self.symbols, state)
 
     def moved(self, skeleton: Skeleton) -> frozenset[str]:
         """The bodies that a sequence moves."""

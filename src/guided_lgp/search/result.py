@@ -21,9 +21,9 @@ Cause = Literal["infeasible", "max_depth", "max_seconds"]
 Limit = Literal["max_tree_size", "max_sequences", "max_paths", "max_seconds"]
 """The limits that end a search, by their names in the parameters."""
 
-Reason = Limit | Literal["exhausted", "attempts", "impossible"]
-"""Why a search ended without a plan: a limit, nothing left to expand, no reattempt left, or a goal
-that was known to be out of reach before any search."""
+Reason = Limit | Literal["exhausted", "attempts", "impossible", "given"]
+"""Why a search ended without a plan: a limit, nothing left to expand, no reattempt left, a goal
+that was known to be out of reach before any search, or a sequence given that is infeasible."""
 
 REASONS: Mapping[Reason, str] = {
     "max_tree_size": "stopped at the limit of the tree size",
@@ -33,6 +33,7 @@ REASONS: Mapping[Reason, str] = {
     "exhausted": "every sequence within the depth limit is infeasible",
     "attempts": "the last allowed attempt failed",
     "impossible": "a goal is out of reach",
+    "given": "the given sequence of actions is infeasible",
 }
 """In words."""
 
@@ -141,7 +142,7 @@ class Run:
         """The sequence of the last verdict against one; no feasible sequence begins with it."""
         self._causes: list[Cause] = []
         self.expansions = 0
-        self.solution: tuple[CoarseResult, PathResult] | None = None
+        self._found: dict[Skeleton, tuple[CoarseResult, PathResult]] = {}
 
     def coarse(self, skeleton: Skeleton) -> CoarseResult:
         """P_coarse of a sequence, its prefixes first: they warm-start it.
@@ -184,6 +185,8 @@ class Run:
 
     def solve(self, skeleton: Skeleton) -> bool:
         """Coarse, then path bound of a sequence that satisfies the objective."""
+        if skeleton in self._found:
+            return True
         if not self._problem.misplaced.keys() <= self._problem.moved(skeleton):
             return False
         coarse = self.coarse(skeleton)
@@ -195,10 +198,20 @@ class Run:
         self._path_s += path.time_s
         self._path_calls += 1
         if path.feasible:
-            self.solution = coarse, path
+            self._found[skeleton] = coarse, path
         elif not self._cut_off:
             self._failure, self.failed = path.failure, skeleton
         return path.feasible
+
+    @property
+    def enough(self) -> bool:
+        """Whether as many plans have been found as there shall be candidates."""
+        return len(self._found) >= self._problem.candidates
+
+    @property
+    def solution(self) -> tuple[CoarseResult, PathResult] | None:
+        """The plan of the fewest actions found, of several the one of the shortest duration."""
+        return min(self._found.values(), key=lambda found: _cost(found[1]), default=None)
 
     def _in_time(self, bound: Callable[[Skeleton], Verdict], otherwise: Verdict) -> Verdict:
         """The verdict of a bound, or another one where the time is up."""
@@ -248,7 +261,9 @@ class Run:
 
     def result(self, tree_size: int, reason: Reason | None = None) -> SearchResult:
         """The result of the run: solved, or ended for a reason."""
-        if reason is not None and self._cut_off:
+        if self._found:
+            reason = None
+        elif reason is not None and self._cut_off:
             reason = "max_seconds"
         followed = self._causes if reason is None else self._causes[:-1]
         causes: tuple[Cause, ...] = ("infeasible", "max_depth")
@@ -271,3 +286,9 @@ class Run:
             failure=None if reason is None else self._failure,
             failed=() if reason is None else self.failed,
         )
+
+
+def _cost(path: PathResult) -> tuple[int, float]:
+    """Actions, and duration (s) where the path has one."""
+    duration = 0.0 if path.trajectory is None else float(path.trajectory.times[-1])
+    return len(path.skeleton), duration

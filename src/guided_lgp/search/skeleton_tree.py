@@ -42,9 +42,10 @@ class SkeletonTree:
     A policy, if there is one, scores the children of each.
     """
 
-    def __init__(self, problem: Problem, prefix: Skeleton = ()) -> None:
+    def __init__(self, problem: Problem) -> None:
         self.problem = problem
         self.run = Run(problem)
+        prefix = problem.prefix
         self.root = Node(0, prefix, progress(problem.scene.state, prefix))
         self.size = 1
 
@@ -107,6 +108,13 @@ class SkeletonTree:
             policy, goals, node.state, problem.scene.symbols, positions, actions
         ).tolist()
         return scores
+
+    @property
+    def max_depth(self) -> int:
+        """How long sequences may be: at the limit, or as long as the shortest plan known."""
+        known = self.run.solution
+        limit = self.problem.limits.max_depth
+        return limit if known is None else min(limit, len(known[1].skeleton))
 
     def limit_reached(self) -> Limit | None:
         """The limit that ends the search, if one is reached."""
