@@ -6,9 +6,9 @@ pinocchio puts it, and the boxes carried along as the attachments say. ``check(d
 the faults.
 
 Conventions: lengths in m, angles in rad, times in s; poses are homogeneous matrices (..., 4, 4) in
-the world, where the base link is at the scene's ``robot.base`` (x, y, yaw) and ``robot.height``. A
-*row* is an index into ``path.times``; *interval* i lies between rows i and i + 1, where joints move
-linearly.
+the world, where the base link is at the scene's ``robot.base`` (x, y, yaw) and ``robot.height``,
+turned by ``robot.tilt``. A *row* is an index into ``path.times``; *interval* i lies between rows i
+and i + 1, where joints move linearly.
 """
 
 import itertools
@@ -99,6 +99,7 @@ class Plan:
     tables: dict[str, dict[str, Any]]  # what may be stood on and is not moved
     obstacles: dict[str, dict[str, Any]]
     base: tuple[float, float, float, float]  # x, y, height, yaw
+    tilt: tuple[float, float]  # roll and pitch before that yaw; a base that is tilted has no column
     goals: list[tuple[str, ...]]
     actions: list[tuple[str, ...]]
     joints: list[str]
@@ -107,6 +108,10 @@ class Plan:
     q: np.ndarray  # (n, joints)
     attachments: list[Attachment]
     keyframes: list[Keyframe]
+
+    @property
+    def column(self) -> bool:
+        return self.base[2] > 0 and not any(self.tilt)
 
 
 class Motion(NamedTuple):
@@ -189,6 +194,7 @@ def _read(document: Mapping[str, Any]) -> Plan:
         },
         obstacles={body["name"]: body for body in scene.get("obstacles", [])},
         base=(x, y, float(placed.get("height", 0.0)), yaw),
+        tilt=tuple(map(float, placed.get("tilt", (0.0, 0.0)))),
         goals=[_atom(goal, GOALS) for goal in document["objective"]],
         actions=[_atom(action, ACTIONS) for action in document["actions"]],
         joints=list(document["joint_names"]),
@@ -553,6 +559,7 @@ class Robot:
         self.link = {item.name: self.model.frames[item.parentFrame].name for item in items}
         self.fixed = {item.name for item in items if item.parentJoint == 0}
         self.base = _planar(*plan.base)
+        self.base[:3, :3] @= Rotation.from_euler("xy", plan.tilt).as_matrix()
 
     def hull_names(self, links: Iterable[str]) -> list[str]:
         """The hulls of links."""
@@ -819,7 +826,7 @@ class _World:
         for name, item in (plan.boxes | plan.tables | plan.obstacles).items():
             self.vertices[name] = _body(item)
         height = plan.base[2]
-        if height:
+        if plan.column:
             column = _corners((2 * plan.stand[0], 2 * plan.stand[1], height))
             self.vertices[COLUMN] = column - (0, 0, height / 2)
         self.bodies = {}
@@ -920,7 +927,7 @@ def _pairs(plan: Plan, robot: Robot) -> Iterator[tuple[str, str]]:
     if plan.srdf is not None:
         pairs = ET.parse(plan.srdf).getroot().iter("disable_collisions")
         disabled = {frozenset((pair.get("link1"), pair.get("link2"))) for pair in pairs}
-    column = [COLUMN] if plan.base[2] else []
+    column = [COLUMN] if plan.column else []
     bodies = [*plan.boxes, *plan.tables, *plan.obstacles, *column]
     still = {*robot.fixed, *plan.tables, *plan.obstacles, *column}  # what touches there always does
     for pair in itertools.combinations([*robot.hulls, *bodies], 2):

@@ -294,12 +294,12 @@ def test_a_take_from_an_empty_hand_is_told(handed_over: dict[str, Any]) -> None:
     assert kinds(check(plan)) == {"logic"}
 
 
-def test_one_arm_on_a_column_is_accepted_and_its_faults_told(tmp_path: Path) -> None:
+def before_a_panda(**robot: Any) -> Scene:
     table = {"position": [0.5, 0.0, 0.4], "half_extents": [0.17, 0.4]}
     size = [0.12, 0.05, 0.08]
-    scene = parse_scene(
+    return parse_scene(
         {
-            "robot": {"model": "panda", "height": 0.4},
+            "robot": {"model": "panda"} | robot,
             "tables": [{"name": "tab1", **table}],
             "boxes": [
                 {"name": "red", "size": size, "position": [0.5, 0.25, 0.44], "on": "tab1"},
@@ -308,6 +308,10 @@ def test_one_arm_on_a_column_is_accepted_and_its_faults_told(tmp_path: Path) -> 
         },
         "scene.json",
     )
+
+
+def test_one_arm_on_a_column_is_accepted_and_its_faults_told(tmp_path: Path) -> None:
+    scene = before_a_panda(height=0.4)
     skeleton = "(grasp panda red) (place panda red green)"
     plan = written_plan(tmp_path, scene, skeleton, "(on red green)")
     assert check(plan) == []
@@ -341,3 +345,12 @@ def test_a_pointed_support_carries_nothing(in_kitchen: dict[str, Any]) -> None:
         [0.1 * x if z > 0 else x, 0.1 * y if z > 0 else y, z] for x, y, z in wedge["vertices"]
     ]
     assert any("is not over it" in fault.text for fault in check(plan))
+
+
+def test_an_arm_that_hangs_is_accepted_and_one_that_stands_there_is_not(tmp_path: Path) -> None:
+    scene = before_a_panda(base=[0.1, 0.0, 0.2], height=1.25, tilt=[np.pi, 0.0])
+    skeleton = "(grasp panda red) (place panda red green)"
+    plan = written_plan(tmp_path, scene, skeleton, "(on red green)")
+    assert check(plan) == []
+    plan["scene"]["robot"]["tilt"] = [np.pi, 0.1]
+    assert "grasp" in kinds(check(plan))

@@ -1,5 +1,6 @@
 """The robots that are known by name: the files beside this one."""
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -31,3 +32,9 @@ def load_robot(name: str) -> Robot:
         accepted = f"{', '.join(robot_names())}, or the path of a robot file (.yaml)"
         raise InputError("robot", f"unknown robot {name!r}", accepted)
     return read_robot(Path(name).resolve())
+
+
+@cache
+def tilted_robot(name: str, roll: float, pitch: float) -> Robot:
+    """A robot whose base link is not level, see :func:`load_robot`; angles in rad."""
+    return replace(load_robot(name), tilt=(roll, pitch))

@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from guided_lgp.poses import IDENTITY, Array
+from guided_lgp.robots.chain import turn
 from guided_lgp.robots.description import Description
 from guided_lgp.robots.document import FixedJoint, OffsetShoulderDocument
 from guided_lgp.robots.kinematics import Kinematics
@@ -181,6 +182,15 @@ class Robot:
     """Joints that keep the value that the scene gives them, by their name in the scene."""
     arms: Mapping[str, Arm]
     """By gripper."""
+    tilt: tuple[float, float] = (0.0, 0.0)
+    """Roll and pitch (rad) of the base link where it is mounted."""
+
+    @property
+    def mounting(self) -> Array:
+        """Rotation (3, 3) of the base link in the level frame of the base."""
+        x, y, _ = np.eye(3)
+        roll, pitch = map(np.array, self.tilt)
+        return np.asarray(turn(y, pitch) @ turn(x, roll))
 
     @property
     def urdf(self) -> Path:

@@ -1,9 +1,10 @@
 """The scene document: robot, tables, boxes and obstacles."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import (
@@ -21,10 +22,13 @@ from guided_lgp.documents import read_json
 from guided_lgp.domains import PAPER, domain_names, load_domain
 from guided_lgp.faults import Document, first_fault, refuse_unknown
 from guided_lgp.logic import State, Symbols
-from guided_lgp.poses import Array, compose, pose
-from guided_lgp.robots import Robot, load_robot
-from guided_lgp.scene.bodies import Body, Box, Coordinate, Obstacle, Table
+from guided_lgp.poses import Array, compose, pose, quaternion
+from guided_lgp.robots import Robot, load_robot, tilted_robot
+from guided_lgp.scene.bodies import Angle, Body, Box, Coordinate, Obstacle, Table
 from guided_lgp.scene.shapes import Convex
+
+_LEVEL = 1e-9
+"""Sine of a roll that leaves the plane between the arms where it is."""
 
 
 @dataclass(frozen=True)
@@ -52,18 +56,28 @@ class PlacedRobot(BaseModel):
     base: tuple[Coordinate, Coordinate, Coordinate] = (0.0, 0.0, 0.0)
     """x and y (m) and yaw (rad) of the base link."""
     height: Annotated[float, Field(strict=True, ge=0, le=5, allow_inf_nan=False)] = 0.0
-    """Of the base link above the floor (m); above it, the robot stands on a column."""
+    """Of the base link above the floor (m); above it, a level robot stands on a column."""
+    tilt: tuple[Angle, Angle] = (0.0, 0.0)
+    """Roll and pitch (rad) of the base link, before its yaw: for an arm on a wall or a ceiling."""
 
     @property
     def description(self) -> Robot:
-        """The robot itself."""
-        return load_robot(self.model)
+        """The robot itself, mounted as it is."""
+        return tilted_robot(self.model, *self.tilt) if any(self.tilt) else load_robot(self.model)
+
+    @property
+    def level_pose(self) -> Array:
+        """Pose (7,) of a level frame at the base link in the world."""
+        x, y, yaw = self.base
+        return pose((x, y, self.height), yaw)
 
     @property
     def base_pose(self) -> Array:
         """Pose (7,) of the base link in the world."""
-        x, y, yaw = self.base
-        return pose((x, y, self.height), yaw)
+        if not any(self.tilt):
+            return self.level_pose
+        mounting = np.array([0.0, 0.0, 0.0, *quaternion(self.description.mounting)])
+        return compose(self.level_pose, mounting)
 
     @property
     def fixed_values(self) -> dict[str, float]:
@@ -74,7 +88,7 @@ class PlacedRobot(BaseModel):
     @property
     def columns(self) -> tuple[Column, ...]:
         """What the robot stands on, where that is not the floor: an obstacle."""
-        if not self.height:
+        if not self.height or any(self.tilt):
             return ()
         convex = Convex("box", (*self.description.stand, self.height / 2))
         return (Column(convex, pose((*self.base[:2], self.height / 2), self.base[2])),)
@@ -116,12 +130,21 @@ class PlacedRobot(BaseModel):
         refuse_unknown(data, (*cls.model_fields, *defaults))
         return data | {name: data.get(name, value) for name, value in defaults.items()}
 
+    @model_validator(mode="after")
+    def _mirror_images(self) -> Self:
+        mirrored = any(arm.mirror_of for arm in self.description.arms.values())
+        if mirrored and abs(math.sin(self.tilt[0])) > _LEVEL:
+            raise ValueError("tilt: a robot whose arms are mirror images can pitch, not roll")
+        return self
+
     @model_serializer(mode="wrap")
     def _without_floor(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Version 1 of the document has no height."""
+        """Version 1 of the document has neither height nor tilt."""
         document: dict[str, Any] = serialize(self)
         if not self.height:
             del document["height"]
+        if not any(self.tilt):
+            del document["tilt"]
         return document
 
 

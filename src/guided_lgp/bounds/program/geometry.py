@@ -56,7 +56,7 @@ class SceneGeometry:
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         self.domain = scene.symbols.domain
-        to_robot = inverse(scene.robot.base_pose)
+        to_robot = inverse(scene.robot.level_pose)
         self._turn = float(yaw_of(to_robot))
         self._shift = to_robot[:3]
         self.bodies: dict[str, LevelBody] = {}

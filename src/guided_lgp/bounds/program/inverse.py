@@ -92,6 +92,7 @@ class General:
         joints = (joint.joint for joint in robot.fixed_joints.values())
         values = dict(zip(joints, fixed, strict=True))
         self._solver = inverse_kinematics(robot, arm.arm.gripper, values)
+        self._mounting = robot.mounting
         self._values = self._solver.redundancies(_VALUES)
 
     def __call__(
@@ -100,7 +101,9 @@ class General:
         """See :class:`Reach`; every branch at the contact goes on on the nearest at the ends."""
         rotation, position = tool_targets(held, hand, poses, pitches, ends, self._arm.palm_front)
         q, missing = self._solver.nearest(
-            rotation[..., None, :, :], position[..., None, :], self._values
+            self._mounting.T @ rotation[..., None, :, :],
+            position[..., None, :] @ self._mounting,
+            self._values,
         )
         joints, lost = self._followed(q, missing)
         candidates = (*joints.shape[:3], -1)

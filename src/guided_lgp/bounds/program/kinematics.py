@@ -1,6 +1,7 @@
 """Kinematics of arms in CasADi: a robot's chains as kernels need them.
 
-A chain is read from the robot's description in the frame of the robot's base link. An arm that is
+A chain is read from the robot's description in the robot's frame: that of its base link, made level
+where the robot is mounted otherwise. An arm that is
 the mirror image of another shares its chain: mirrored joint values go in, and ``side`` = -1 turns
 the result over at the plane y = 0.
 """
@@ -33,7 +34,7 @@ class ArmPose:
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """The joints from the robot's base link to a tool frame, and what is fixed to them."""
+    """The joints from the robot's frame to a tool frame, and what is fixed to them."""
 
     gripper: str
     """At its end."""
@@ -188,7 +189,7 @@ def _chain(
     return Chain(
         gripper=arm.gripper,
         name=name,
-        joints=tuple(path_between(joints, robot.base_link, arm.tool_link)),
+        joints=(*_mounting(robot), *path_between(joints, robot.base_link, arm.tool_link)),
         tool=(rotation_matrix(arm.tool_in_link[3:]), arm.tool_in_link[:3]),
         moving=arm.joints,
         fixed=fixed,
@@ -196,6 +197,14 @@ def _chain(
         against_arms=arm.spheres_between_arms,
         palm_front=arm.palm_front,
     )
+
+
+def _mounting(robot: Robot) -> tuple[Joint, ...]:
+    """What turns the base link away from the level frame of the base, if anything does."""
+    if not any(robot.tilt):
+        return ()
+    link = robot.base_link
+    return (Joint("", "fixed", "", link, robot.mounting, np.zeros(3), np.zeros(3)),)
 
 
 def _exact(values: Array) -> Any:
