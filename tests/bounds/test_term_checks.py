@@ -16,6 +16,7 @@ from guided_lgp.bounds.terms import at, balanced, carried, hold, kernel_table, p
 from guided_lgp.poses import compose, pose, quaternion
 from guided_lgp.scene import Box, PlacedRobot, Scene, Table
 from guided_lgp.scene.footprints import footprint, gap
+from guided_lgp.scene.shapes import Convex
 from guided_lgp.scene.tolerances import BALANCE_INSET
 from guided_lgp.scene.world import World
 
@@ -23,6 +24,7 @@ PLACED = PlacedRobot(base=(0.0, 0.0, 0.0))
 ROBOT = PLACED.description
 FIXED = tuple(PLACED.fixed_values.values())
 TABLE = kernel_table(kinematics_of(ROBOT))
+SQRT = np.sqrt(0.5)
 SIZE = (0.15, 0.07, 0.10)
 HALF_LENGTH, HALF_HEIGHT = 0.075, 0.05
 
@@ -40,7 +42,16 @@ def both_verdicts(verdicts: list[bool]) -> None:
 
 
 def held(gripper: str = "pr2L") -> HeldBox:
-    return HeldBox(gripper, "red", 0, 1, 2, GraspSide(0.0, HALF_LENGTH, SIZE[1]), HALF_HEIGHT, 0.0)
+    return HeldBox(
+        gripper,
+        "red",
+        0,
+        1,
+        2,
+        GraspSide(0.0, HALF_LENGTH, SIZE[1], (HALF_LENGTH, HALF_HEIGHT)),
+        HALF_HEIGHT,
+        0.0,
+    )
 
 
 @pytest.mark.parametrize("gripper", ROBOT.grippers)
@@ -80,17 +91,33 @@ def test_pads() -> None:
     for _ in range(200):
         pitch, offset = rng.uniform(0.0, np.pi), rng.uniform(-0.09, 0.09)
         depth = rng.uniform(PALM_GAP, 0.04)
-        sides = np.array([HALF_LENGTH, HALF_HEIGHT])
+        sides = np.array(2 * [HALF_LENGTH, HALF_HEIGHT])
         rows = residual("pads_0", np.array([pitch, offset, depth]), sides)
         hand, pitches = (offset, depth), np.array([pitch])
         rotation, position = tool_targets(
             held(), hand, np.zeros((1, 4)), pitches, np.zeros((1, 2)), palm_front
         )
         tool = [*position[0, 0, 0], *quaternion(rotation[0, 0, 0])]
-        excess = pads.check(SIZE, pose((0.0, 0.0, 0.0)).tolist(), tool)
+        excess = pads.check(
+            Convex("box", (HALF_LENGTH, SIZE[1] / 2, HALF_HEIGHT)),
+            pose((0.0, 0.0, 0.0)).tolist(),
+            tool,
+        )
         assert excess == pytest.approx(-rows.min() - pads.TOLERANCE, abs=1e-5)
         verdicts.append(excess < 0)
     both_verdicts(verdicts)
+
+
+def test_pads_of_a_cylinder_are_at_its_axis() -> None:
+    """From above, a hand beside the axis would have its fingers where the cylinder is narrower."""
+    can, tool = (
+        Convex("cylinder", (0.033, 0.033, 0.05)),
+        np.array([0.0, 0.0, 0.04, 0, SQRT, 0, SQRT]),
+    )
+    excess = [pads.check(can, pose((x, 0, 0)).tolist(), tool.tolist()) for x in (0.0, 0.005, 0.02)]
+    assert excess[0] < 0
+    assert excess[1] < 0
+    assert excess[2] > 0.01
 
 
 def test_balanced() -> None:

@@ -54,6 +54,25 @@ def test_what_carries_lies_inside_top_and_base() -> None:
     assert cone.stands
 
 
+def test_fingers_touch_what_is_there() -> None:
+    """The sides of a box, the line of a cylinder, parallel faces of a mesh, of a cone nothing."""
+    assert Convex("box", (0.1, 0.2, 0.3)).side(0) == (0.1, 0.2, 0.3)
+    assert Convex("cylinder", (0.05, 0.05, 0.1)).side(0) == (0.05, 0.008, 0.1)
+    prism = [
+        (x * half, y, z)
+        for z, half in ((0, 0.05), (0.06, 0.02))
+        for x in (-1, 1)
+        for y in (0, 0.05)
+    ]
+    body = scene(odd(vertices=prism, shape="mesh")).boxes[1].convex
+    assert min(body.side(0)[1:]) == 0
+    along, _, high = body.side(1)
+    assert 0.02 < along < 0.05
+    assert 0.005 < high < 0.03
+    cone = scene(odd(vertices=CONE, shape="mesh")).boxes[1].convex
+    assert min(cone.side(0)[1:]) == min(cone.side(1)[::2]) == 0
+
+
 def test_the_frame_of_a_hull_is_at_its_centre_of_mass() -> None:
     rng = np.random.default_rng(3)
     points = np.array([1.0, 2.0, 3.0]) + rng.uniform(-0.1, 0.1, (40, 3))

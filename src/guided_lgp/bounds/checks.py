@@ -11,6 +11,7 @@ from functools import lru_cache
 
 from guided_lgp.poses import pose
 from guided_lgp.scene import Scene
+from guided_lgp.scene.shapes import Convex
 
 Pose = Sequence[float]
 Vector = tuple[float, float, float]
@@ -36,6 +37,12 @@ class Violation:
 def box_sizes(scene: Scene) -> Mapping[str, Vector]:
     """Extents (m) of every box that may be moved."""
     return {box.name: box.size for box in scene.movable}
+
+
+@lru_cache(maxsize=64)
+def box_bodies(scene: Scene) -> Mapping[str, Convex]:
+    """Every box that may be moved."""
+    return {box.name: box.convex for box in scene.movable}
 
 
 @lru_cache(maxsize=64)

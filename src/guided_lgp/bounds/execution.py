@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from guided_lgp.bounds.checks import Violation, box_sizes
+from guided_lgp.bounds.checks import Violation, box_bodies
 from guided_lgp.bounds.goals import GoalTerms
 from guided_lgp.bounds.results import Array, Trajectory
 from guided_lgp.bounds.verify.attachments import switches_of
@@ -172,8 +172,8 @@ class _Execution:
     def grasp(self, gripper: str, box: str) -> str:
         """Fix the box to the palm as they are; returns a fault if the gripper is not there."""
         tool, placement = self._tool(gripper), self._box(box)
-        size, arm = box_sizes(self._world.scene)[box], self._robot.arms[gripper]
-        faults = grasp_faults(arm, box, size, placement.tolist(), tool.tolist())
+        body, arm = box_bodies(self._world.scene)[box], self._robot.arms[gripper]
+        faults = grasp_faults(arm, box, body, placement.tolist(), tool.tolist())
         if faults and faults[0].amount > GRASP_SLACK:
             return faults[0].constraint
         palm = self._world.links[arm.hand_links[0]]

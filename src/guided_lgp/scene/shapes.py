@@ -23,6 +23,9 @@ _SIDES = 32
 """Of the prism around a cylinder."""
 _FLAT = 0.001
 """How far (m) the vertices of a mesh may be from a plane that it stands on."""
+_LINE = 0.008
+"""Half the width (m) of the strip of a cylinder that fingers touch: the hand is so near to it."""
+_UP = 2
 _DECIMALS = 6
 """Vertices of a mesh are given to a micrometre."""
 _SAME = 5e-6
@@ -62,14 +65,30 @@ class Convex:
         What stands on the body has its centre of mass above this; zero where nothing can.
         """
         if self.shape == "mesh":
-            return _common_rectangle(self.vertices, self.half)
+            return _common_rectangle(self.vertices, self.half, _UP)
         share = math.sqrt(0.5) if self.shape == "cylinder" else 1.0
         return share * self.half[0], share * self.half[1]
+
+    def side(self, axis: int) -> Vector:
+        """Half extents (m) about the centre of what fingers may touch that close along an axis.
+
+        Of a box, its sides; of a mesh, a rectangle inside both of two parallel faces, if there are
+        any; of a cylinder, the line that they touch. The component along the axis has no meaning.
+        """
+        found = list(self.half)
+        if self.shape == "mesh":
+            first, second = _common_rectangle(self.vertices, self.half, axis)
+        elif self.shape == "cylinder":
+            first, second = self.rest if axis == _UP else (min(_LINE, self.half[0]), self.half[2])
+        else:
+            return self.half
+        found[_across(axis)[0]], found[_across(axis)[1]] = first, second
+        return found[0], found[1], found[2]
 
     @property
     def stands(self) -> bool:
         """Whether the centre of mass is above a flat base."""
-        return self.shape != "mesh" or min(_rectangle(self.vertices, self.half, -1)) > 0
+        return self.shape != "mesh" or min(_rectangle(self.vertices, self.half, _UP, -1)) > 0
 
     def faces(self) -> NDArray[np.int32]:
         """Triangles (m, 3) of the hull of :meth:`points`, seen from outside."""
@@ -156,18 +175,27 @@ def _hull_volume(vertices: tuple[Vector, ...]) -> float:
     return float(ConvexHull(np.array(vertices)).volume)
 
 
+def _across(axis: int) -> tuple[int, int]:
+    """The other two axes."""
+    first, second = (other for other in range(3) if other != axis)
+    return first, second
+
+
 @cache
-def _common_rectangle(vertices: tuple[Vector, ...], half: Vector) -> tuple[float, float]:
-    top, base = _rectangle(vertices, half, 1), _rectangle(vertices, half, -1)
-    return min(top[0], base[0]), min(top[1], base[1])
+def _common_rectangle(vertices: tuple[Vector, ...], half: Vector, axis: int) -> tuple[float, float]:
+    """Half extents (m) of a rectangle about an axis inside the flat faces at both of its ends."""
+    one, other = (_rectangle(vertices, half, axis, side) for side in (1, -1))
+    return min(one[0], other[0]), min(one[1], other[1])
 
 
-def _rectangle(vertices: tuple[Vector, ...], half: Vector, side: int) -> tuple[float, float]:
-    """Half extents (m) of a rectangle about the axis inside the flat top (1) or base (-1)."""
+def _rectangle(
+    vertices: tuple[Vector, ...], half: Vector, axis: int, side: int
+) -> tuple[float, float]:
+    """Half extents (m) of a rectangle about an axis inside the flat face at one of its ends."""
     from scipy.spatial import ConvexHull, QhullError
 
     points = np.array(vertices)
-    flat = points[side * points[:, 2] >= half[2] - _FLAT, :2]
+    flat = points[side * points[:, axis] >= half[axis] - _FLAT][:, _across(axis)]
     try:
         normals_and_offsets = ConvexHull(flat).equations
     except (QhullError, ValueError):

@@ -11,6 +11,7 @@ from guided_lgp.bounds.results import Array
 from guided_lgp.robots import Arm
 from guided_lgp.scene import Box
 from guided_lgp.scene.model import grasp_axes
+from guided_lgp.scene.shapes import Convex
 
 _PITCHES = 8
 """Steps of the approach from one end of the box over the top to the other."""
@@ -51,22 +52,23 @@ def grips_of(box: Box, arm: Arm) -> dict[float, tuple[Grips, Grips]]:
     Grids over sides of the box, pitch and flip of the hand: the deep and centred grips, and all
     others. Nothing for a box that is too wide for the hand.
     """
-    return _grips(box.size, arm.palm_front, arm.fingers.grasp_width)
+    return _grips(box.convex, arm.palm_front, arm.fingers.grasp_width)
 
 
 @cache
-def _grips(
-    size: tuple[float, float, float], palm_front: float, widest: float
-) -> dict[float, tuple[Grips, Grips]]:
+def _grips(body: Convex, palm_front: float, widest: float) -> dict[float, tuple[Grips, Grips]]:
     found: dict[float, tuple[list[_Frame], list[_Frame]]] = {}
     pitches = np.pi * np.arange(_PITCHES + 1) / _PITCHES
-    for across, pitch, shift in product(grasp_axes(size, widest), pitches, _SHIFTS):
-        central, others = found.setdefault(size[across], ([], []))
+    for across, pitch, shift in product(grasp_axes(body.size, widest), pitches, _SHIFTS):
+        central, others = found.setdefault(body.size[across], ([], []))
         along, closing = np.eye(3)[1 - across], np.eye(3)[across]
         approach = np.cos(pitch) * along - np.sin(pitch) * np.array([0.0, 0.0, 1.0])
         third = np.cross(approach, closing)
-        half = np.array(size) / 2
-        for number, reach in enumerate(_reaches(half, palm_front, approach, shift * third)):
+        half, touched = np.array(body.half), np.array(body.side(across))
+        if min(touched) <= INSET:
+            continue
+        reaches = _reaches(half, touched - INSET, palm_front, approach, shift * third)
+        for number, reach in enumerate(reaches):
             offset = shift * third - reach * approach
             for flip in (1.0, -1.0):
                 frame = np.stack([approach, flip * closing, flip * third], axis=1), offset
@@ -78,10 +80,10 @@ _Frame = tuple[Array, Array]
 """Rotation and origin of the tool frame in the box's."""
 
 
-def _reaches(half: Array, palm_front: float, approach: Array, shift: Array) -> Array:
+def _reaches(half: Array, inner: Array, palm_front: float, approach: Array, shift: Array) -> Array:
     """How far (m) the tool may stay behind the box's centre, deepest first; none that holds it."""
     palm = np.abs(approach) @ half + palm_front + PALM_GAP
-    ahead, inner = np.copysign(1.0, approach) * shift, half - INSET
+    ahead = np.copysign(1.0, approach) * shift
     slope = np.maximum(np.abs(approach), _LEAST)
     nearest, farthest = max(palm, *((ahead - inner) / slope)), min((ahead + inner) / slope)
     return np.linspace(nearest, farthest, _DEPTHS if nearest <= farthest else 0)

@@ -37,6 +37,8 @@ class LevelBody:
     rest: tuple[float, float]
     """Half extents (m) of the part of its top above which centres of mass may be."""
     mass: float
+    sides: tuple[Vector, Vector]
+    """What fingers may touch that close along its x and y axis, see :meth:`Convex.side`."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +50,8 @@ class GraspSide:
     half_length: float
     width: float
     """From one to the other (m)."""
+    touched: tuple[float, float]
+    """Half extents (m) of what fingertips may touch, along the length and in height."""
 
 
 class SceneGeometry:
@@ -70,7 +74,9 @@ class SceneGeometry:
     def _add(self, body: Body) -> str:
         half, (x, y, z), yaw = level_box(body)
         convex = body.convex
-        self.bodies[body.name] = LevelBody(body.name, half, convex.rest, convex.volume)
+        self.bodies[body.name] = LevelBody(
+            body.name, half, convex.rest, convex.volume, (convex.side(0), convex.side(1))
+        )
         self.poses[body.name] = (*self.in_robot(x, y, yaw), z + float(self._shift[2]))
         return body.name
 
@@ -94,9 +100,14 @@ class SceneGeometry:
 
     def grasp_sides(self, name: str, widest: float) -> tuple[GraspSide, ...]:
         """The sides of a box that fingers, open up to ``widest`` (m), can close on."""
-        hx, hy, hz = self.bodies[name].half
-        sides = GraspSide(np.pi / 2, hy, 2 * hx), GraspSide(0.0, hx, 2 * hy)
-        return tuple(sides[axis] for axis in grasp_axes((2 * hx, 2 * hy, 2 * hz), widest))
+        body = self.bodies[name]
+        (hx, hy, hz), (along_y, along_x) = body.half, body.sides
+        sides = (
+            GraspSide(np.pi / 2, hy, 2 * hx, along_y[1:]),
+            GraspSide(0.0, hx, 2 * hy, along_x[::2]),
+        )
+        order = grasp_axes((2 * hx, 2 * hy, 2 * hz), widest)
+        return tuple(sides[axis] for axis in order if min(sides[axis].touched) > 0)
 
 
 def level_box(body: Body) -> tuple[Vector, Vector, float]:

@@ -3,10 +3,11 @@
 import math
 from collections.abc import Collection, Mapping
 
-from guided_lgp.bounds.checks import Pose, Vector, Violation, box_sizes, top_of, volumes
+from guided_lgp.bounds.checks import Pose, Violation, box_sizes, top_of, volumes
 from guided_lgp.bounds.terms import balanced, hold, pads, stand
 from guided_lgp.robots import Arm, Robot
 from guided_lgp.scene import Scene
+from guided_lgp.scene.shapes import Convex
 from guided_lgp.scene.tolerances import BALANCE_INSET
 from guided_lgp.scene.world import Penetration, initial_poses
 
@@ -18,13 +19,13 @@ _SAME = 1e-6
 """Distance (m) of places that are one, but for rounding."""
 
 
-def grasp_faults(arm: Arm, box: str, size: Vector, placement: Pose, tool: Pose) -> list[Violation]:
+def grasp_faults(arm: Arm, box: str, body: Convex, placement: Pose, tool: Pose) -> list[Violation]:
     """Whether the gripper holds the box: closing across it, fingertips on it, palm outside.
 
     Args:
         arm: of the gripper.
         box: its name.
-        size: its extents (m).
+        body: what it is.
         placement: its pose.
         tool: pose of the gripper's tool frame.
 
@@ -32,8 +33,8 @@ def grasp_faults(arm: Arm, box: str, size: Vector, placement: Pose, tool: Pose) 
         The greater violation first.
     """
     excess = {
-        "hold": hold.check(size, placement, tool, arm.palm_front, arm.fingers.grasp_width),
-        "pads": pads.check(size, placement, tool),
+        "hold": hold.check(body.size, placement, tool, arm.palm_front, arm.fingers.grasp_width),
+        "pads": pads.check(body, placement, tool),
     }
     found = [Violation(f"{term} {arm.gripper} {box}", e) for term, e in excess.items() if e > 0]
     return sorted(found, key=lambda violation: -violation.amount)

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from guided_lgp.bounds.checks import Violation, body_names, box_sizes, closing_axis, overlap_name
+from guided_lgp.bounds.checks import Violation, body_names, box_bodies, closing_axis, overlap_name
 from guided_lgp.bounds.results import Array, Keyframe
 from guided_lgp.bounds.terms import carried
 from guided_lgp.bounds.terms.carried import Relative, relative
@@ -36,8 +36,8 @@ def verify_keyframe(
     after = state if action is None else successor(state, action)
     held = tuple(dict.fromkeys((*state.held, *after.held)))
     support = dict(state.support) | dict(after.support)
-    sizes, robot = box_sizes(world.scene), world.scene.robot.description
-    boxes = {name: keyframe.boxes[name].tolist() for name in sizes}
+    convex, robot = box_bodies(world.scene), world.scene.robot.description
+    boxes = {name: keyframe.boxes[name].tolist() for name in convex}
     if not math.isfinite(sum(map(sum, boxes.values()))):
         return [Violation("finite pose", math.nan)]
     violations = joint_limit_faults(robot, keyframe.q)
@@ -46,11 +46,11 @@ def verify_keyframe(
         tools = world.tool_poses(gripper for _, gripper in held).tolist()
         for (box, gripper), tool in zip(held, tools, strict=True):
             arm = robot.arms[gripper]
-            width = sizes[box][closing_axis(boxes[box], tool)]
+            width = convex[box].size[closing_axis(boxes[box], tool)]
             keeps = (box, gripper) in state.held and (box, gripper) in after.held
             value = arm.fingers.value if keeps else arm.fingers.value_around
             world.set_fingers({gripper: value(width)})
-            violations += grasp_faults(arm, box, sizes[box], boxes[box], tool)
+            violations += grasp_faults(arm, box, convex[box], boxes[box], tool)
     violations += placement_faults(world.scene, boxes, support)
     bodies = body_names(world.scene)
     violations += [
