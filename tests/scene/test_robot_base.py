@@ -5,7 +5,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from guided_lgp.bounds.coarse import CoarseBound
+from guided_lgp.bounds.coarse.formulation import Formulator
+from guided_lgp.bounds.program.geometry import Margins, SceneGeometry
 from guided_lgp.errors import InputError
+from guided_lgp.logic import parse_skeleton
 from guided_lgp.poses import apply, pose
 from guided_lgp.scene import Scene, parse_scene
 from guided_lgp.scene.bullet import pybullet
@@ -57,6 +61,21 @@ def test_an_arm_that_reaches_into_the_column_collides() -> None:
     with World(scene) as world:
         world.set(q, {})
         assert any("robot.column" in overlap.bodies for overlap in world.penetrations())
+
+
+@pytest.mark.parametrize(("model", "gripper"), [("panda", "panda"), ("ur5", "ur5")])
+def test_the_coarse_bound_keeps_arms_clear_of_the_column(model: str, gripper: str) -> None:
+    scene = raised(model=model)
+    skeleton = parse_skeleton(f"(grasp {gripper} red)")
+    geometry = SceneGeometry(scene)
+    formulation = Formulator(geometry, Margins()).build(skeleton)
+    against = {instance.names for instance in formulation.instances}
+    assert ("clear", gripper, "robot.column") in against
+    result = CoarseBound(scene, 3).solve(skeleton)
+    assert result.feasible, result.failure
+    x, y, z = geometry.bodies["robot.column"].half
+    assert (x, y) == scene.robot.description.stand
+    assert z == pytest.approx(0.15)  # the upper 10 cm are the verification's
 
 
 def test_the_document_names_the_height_only_of_a_raised_robot() -> None:

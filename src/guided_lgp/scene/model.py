@@ -37,6 +37,8 @@ class Column:
 
     convex: Convex
     placement: Array
+    yaw: float
+    """Of that pose (rad)."""
     name: str = "robot.column"
     """No body of a scene can be called so."""
 
@@ -91,7 +93,8 @@ class PlacedRobot(BaseModel):
         if not self.height or any(self.tilt):
             return ()
         convex = Convex("box", (*self.description.stand, self.height / 2))
-        return (Column(convex, pose((*self.base[:2], self.height / 2), self.base[2])),)
+        x, y, yaw = self.base
+        return (Column(convex, pose((x, y, self.height / 2), yaw), yaw),)
 
     def link_poses(self, q: Array, links: Sequence[str]) -> Array:
         """Poses (T, len(links), 7) of links' frames in the world (forward kinematics by pinocchio).

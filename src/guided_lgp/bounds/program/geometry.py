@@ -1,7 +1,8 @@
 """Bodies of a scene and where they are at first, in the robot's frame."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -9,8 +10,8 @@ from guided_lgp.bounds.results import Array
 from guided_lgp.poses import apply, inverse, pose, yaw_of
 from guided_lgp.scene import Scene
 from guided_lgp.scene.bodies import Body
-from guided_lgp.scene.model import grasp_axes
-from guided_lgp.scene.shapes import Vector
+from guided_lgp.scene.model import Column, grasp_axes
+from guided_lgp.scene.shapes import Convex, Vector
 
 
 @dataclass(frozen=True)
@@ -69,9 +70,10 @@ class SceneGeometry:
         """What stays where it is and may be stood on."""
         self.boxes = tuple(map(self._add, scene.movable))
         """What may be moved."""
-        self.obstacles = tuple(map(self._add, scene.obstacles))
+        columns = map(self._add, _lower_parts(scene.robot.columns))
+        self.obstacles = (*columns, *map(self._add, scene.obstacles))
 
-    def _add(self, body: Body) -> str:
+    def _add(self, body: Body | Column) -> str:
         half, (x, y, z), yaw = level_box(body)
         convex = body.convex
         self.bodies[body.name] = LevelBody(
@@ -110,7 +112,22 @@ class SceneGeometry:
         return tuple(sides[axis] for axis in order if min(sides[axis].touched) > 0)
 
 
-def level_box(body: Body) -> tuple[Vector, Vector, float]:
+_SHOULDER = 0.1
+"""Height (m) below the base that balls around the first links may reach, wherever they turn."""
+
+
+def _lower_parts(columns: Iterable[Column]) -> Iterator[Column]:
+    """What the program sees of columns; the verification sees all of them."""
+    for column in columns:
+        x, y, z = column.convex.half
+        if 2 * z > _SHOULDER:
+            placement = column.placement.copy()
+            placement[2] -= _SHOULDER / 2
+            low = Convex("box", (x, y, z - _SHOULDER / 2))
+            yield replace(column, convex=low, placement=placement)
+
+
+def level_box(body: Body | Column) -> tuple[Vector, Vector, float]:
     """Half extents, centre (m) and yaw (rad) of a level box around a body."""
     x, y, z, *turn = (float(value) for value in body.placement)
     if turn[0] == turn[1] == 0.0:
