@@ -233,7 +233,9 @@ class TestSmallProfile:
         runs = client.search_runs([experiment.experiment_id])
         parents = [run for run in runs if "mlflow.parentRunId" not in run.data.tags]
         assert len(parents) == 1
-        assert "generalization/default/all/shortest" in parents[0].data.metrics
+        assert "shortest/default" in parents[0].data.metrics
+        names = {model.name for model in client.search_registered_models()}
+        assert {"guided-lgp-place", "guided-lgp-improved-place", "guided-lgp-relational"} <= names
         children = [run for run in runs if run not in parents]
         assert {run.info.status for run in runs} == {"FINISHED"}
         stages = list(clone.lock())

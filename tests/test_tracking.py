@@ -27,6 +27,7 @@ from guided_lgp.policy.relational.encoding import Range
 from guided_lgp.policy.relational.heads import heads
 from guided_lgp.policy.relational.model import Weights, shapes
 from guided_lgp.tracking import runs as runs_module
+from guided_lgp.tracking.stage_files import StageFiles
 
 ROOT = Path(__file__).parents[1]
 PARAMS = load_params(ROOT / "params.yaml")
@@ -53,6 +54,8 @@ stages:
       - data
       - reports/report.md:
           cache: false
+      - reports/metrics/summary.json:
+          cache: false
       - reports/training/place.json:
           cache: false
 """
@@ -61,6 +64,7 @@ from pathlib import Path
 for path, text in [
     ("data/x", "1"),
     ("reports/report.md", "# Report"),
+    ("reports/metrics/summary.json", '{{"accuracy": {{"place": 0.9}}}}'),
     ("reports/training/place.json", {json.dumps(METRICS)!r}),
 ]:
     Path(path).parent.mkdir(parents=True, exist_ok=True)
@@ -158,7 +162,7 @@ def test_one_parent_per_execution_and_a_child_per_stage(clone: Path) -> None:
         assert child.data.params["seed_training"] == str(PARAMS.generate_scenes.seed_training)
         assert child.info.status == parent.info.status == "FINISHED"
     assert parent.data.params["train_policy.place.dropout"] == "0.1"
-    assert parent.data.metrics == {"training/place/box/accuracy": 0.9}
+    assert parent.data.metrics == {"accuracy/place": 0.9}
     assert first.data.tags[tracking.KEY_TAG] == second.data.tags[tracking.KEY_TAG]
 
 
@@ -169,24 +173,33 @@ def test_metrics_curves_and_files_are_recorded(clone: Path) -> None:
         "box/accuracy": 0.9,
         "box/loss": 0.5,
         "box/by_configuration/accuracy": 0.8,
+        "accuracy/place": 0.9,
     }
     client = tracking.prepare()
     curve = client.get_metric_history(child.info.run_id, "box/loss")
     assert [(point.step, point.value) for point in curve] == [(0, 2.0), (1, 1.0), (2, 0.5)]
     listings = [client.list_artifacts(child.info.run_id, folder) for folder in (None, "training")]
     files = [item.path for listing in listings for item in listing]
-    assert files == ["report.md", "training", "training/place.json"]
+    assert files == ["metrics", "report.md", "training", "training/place.json"]
 
 
-def test_what_the_parent_selects_is_in_the_reports() -> None:
-    groups, figures = set(), set()
-    for file in (ROOT / "reports" / "metrics").glob("*.json"):
-        for name in tracking.flatten(json.loads(file.read_text()), "/"):
-            *above, figure = name.split("/")
-            groups |= set(above)
-            figures.add(figure)
-    assert figures >= tracking.COMPARED
-    assert groups >= tracking.DETAILS
+def test_the_data_that_a_stage_reads_are_inputs_of_both_runs(clone: Path) -> None:
+    stage = StageFiles("build_dataset", "key", {"data/x": "0123", "src/y": "4567"}, {}, {})
+    run = runs_module._Run.start("build_dataset", PARAMS, "execution", replayed=True)
+    run.finish(stage)
+    for recorded in runs():
+        (data,) = recorded.inputs.dataset_inputs
+        assert (data.dataset.name, data.dataset.digest) == ("data/x", "0123")
+
+
+def test_the_machine_is_watched_while_a_stage_runs(
+    clone: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MLFLOW_SYSTEM_METRICS_SAMPLING_INTERVAL", "0.1")
+    with tracking.recorded("generate_scenes", PARAMS):
+        time.sleep(0.5)
+    (child,) = children()
+    assert "system/cpu_utilization_percentage" in child.data.metrics
 
 
 @pytest.fixture

@@ -98,12 +98,15 @@ def _load_pyfunc(data_path: str) -> Network | FirstActions:
     return Network(load_model(weights.parent, weights.stem))
 
 
-def log_model(folder: Path, name: str) -> None:
+def log_model(folder: Path, name: str) -> Any:
     """Log a trained model to the active run, with its signature and an input example.
 
     Args:
         folder: with ``<name>.safetensors`` and ``<name>.json`` alone.
         name: of a network that a policy declares; a policy of a single network is logged whole.
+
+    Returns:
+        MLflow's ``ModelInfo``.
     """
     import mlflow
     import pandas as pd
@@ -122,7 +125,7 @@ def log_model(folder: Path, name: str) -> None:
         example = pd.DataFrame([row])
         inputs = Schema([ColSpec("string", column) for column in row])
         outputs = Schema([ColSpec("string")])
-    mlflow.pyfunc.log_model(
+    return mlflow.pyfunc.log_model(
         name=name,
         loader_module=__name__,
         data_path=str(folder),

@@ -15,15 +15,14 @@ from guided_lgp.tracking.database import (
     repository,
     tracking_uri,
 )
-from guided_lgp.tracking.metrics import COMPARED, DETAILS, flatten
+from guided_lgp.tracking.metrics import SUMMARY, flatten
 from guided_lgp.tracking.runs import recorded, sync
 
 __all__ = [
-    "COMPARED",
-    "DETAILS",
     "EXPERIMENT",
     "KEY_TAG",
     "STAGE_TAG",
+    "SUMMARY",
     "flatten",
     "prepare",
     "recorded",

@@ -5,16 +5,10 @@ from pathlib import Path
 from typing import Any
 
 from guided_lgp.documents import read_json
-from guided_lgp.search.planners import PLANNERS, RIVALS
+from guided_lgp.paths import METRICS
 
-COMPARED = frozenset(
-    ("accuracy", "shortest", "feasible", "no_solution", "solved", "tree_size_mean", "time_mean_s")
-)
-"""Figures of the stages that the parent run has too, since these runs are compared."""
-DETAILS = frozenset(("by_configuration", *(name for name in RIVALS if not PLANNERS[name].printed)))
-"""Groups of which it has none: the other split, and controls beside the planners of the paper.
-
-A comparison draws a chart per figure; those of all groups would be two thousand."""
+SUMMARY = METRICS / "summary.json"
+"""What the parent run has, too: a comparison of these runs draws a chart per figure."""
 
 
 def flatten(values: Mapping[str, Any], separator: str = ".", prefix: str = "") -> dict[str, Any]:
@@ -42,12 +36,6 @@ def read_metrics(file: Path) -> dict[str, list[float]]:
         if measured and values and all(_is_number(item) for item in values):
             metrics[name] = [float(item) for item in values]
     return metrics
-
-
-def is_compared(name: str) -> bool:
-    """Whether the parent run has a figure, too."""
-    *groups, figure = name.split("/")
-    return figure in COMPARED and DETAILS.isdisjoint(groups)
 
 
 def _is_number(value: object) -> bool:

@@ -1,5 +1,6 @@
 """A parent run per pipeline execution and a child per stage, each recorded once."""
 
+import json
 import logging
 import os
 import shutil
@@ -7,7 +8,7 @@ import subprocess
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from hashlib import sha256
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -27,7 +28,7 @@ from guided_lgp.tracking.database import (
     process,
     recorded_keys,
 )
-from guided_lgp.tracking.metrics import files, flatten, is_compared, read_metrics
+from guided_lgp.tracking.metrics import SUMMARY, files, flatten, read_metrics
 from guided_lgp.tracking.stage_files import (
     StageFiles,
     check_outputs,
@@ -92,6 +93,7 @@ class _Run:
         self._client = client
         self._parent = parent
         self._id = run_id
+        self._monitor: Any = None
 
     @classmethod
     def start(cls, address: str, params: Params, execution: str, replayed: bool) -> "_Run":
@@ -111,9 +113,18 @@ class _Run:
         }
         child = client.create_run(experiment, tags=tags, run_name=address)
         run = cls(client, parent, child.info.run_id)
+        if not replayed:
+            run._watch()
         section = params.model_dump().get(address.partition("@")[0], {})
         _log_params(client, run._id, section)
         return run
+
+    def _watch(self) -> None:
+        """Record processor, memory, disk and network while the stage runs."""
+        from mlflow.system_metrics.system_metrics_monitor import SystemMetricsMonitor
+
+        self._monitor = SystemMetricsMonitor(self._id)
+        self._monitor.start()
 
     def finish(self, stage: StageFiles) -> None:
         """Record what the stage has written."""
@@ -123,20 +134,25 @@ class _Run:
         for file in reports:
             if file.suffix == ".json":
                 _log_metrics(self._client, self._id, read_metrics(file))
+            if file == SUMMARY:
+                _log_metrics(self._client, self._parent, read_metrics(file))
             folder = file.parent.relative_to("reports")
             self._client.log_artifact(self._id, str(file), str(folder) if folder.name else None)
         self._log_models([path for path in outputs if path.suffix == ".safetensors"])
-        read = [file for path in stage.dependencies for file in files(Path(path))]
-        for file in [*read, *reports]:
-            if file.parts[0] == "reports" and file.suffix == ".json":
-                group = "/".join(file.with_suffix("").parts[1:]).removeprefix("metrics/")
-                scalars = {
-                    f"{group}/{name}": [values[-1]]
-                    for name, values in read_metrics(file).items()
-                    if is_compared(name)
-                }
-                _log_metrics(self._client, self._parent, scalars)
+        self._log_datasets(stage)
         self._end("FINISHED")
+
+    def _log_datasets(self, stage: StageFiles) -> None:
+        """The data that the stage has read, by path and md5: in its run and in the parent's."""
+        from mlflow.entities import Dataset, DatasetInput
+
+        inputs = [
+            DatasetInput(Dataset(path, digest or "", "local", json.dumps({"uri": path})))
+            for path, digest in stage.dependencies.items()
+            if Path(path).parts[0] == "data"
+        ]
+        for run in (self._id, self._parent) if inputs else ():
+            self._client.log_inputs(run, datasets=inputs)
 
     def _log_models(self, weights: list[Path]) -> None:
         if not weights:
@@ -150,7 +166,19 @@ class _Run:
                 with TemporaryDirectory() as folder:
                     for file in (path, path.with_suffix(".json")):
                         shutil.copy(file, folder)
-                    log_model(Path(folder), path.stem)
+                    logged = log_model(Path(folder), path.stem)
+                self._register("-".join(path.with_suffix("").parts[1:]), logged)
+
+    def _register(self, name: str, logged: Any) -> None:
+        """Make a logged model the latest version of its name in the registry."""
+        from mlflow import MlflowException
+
+        registered = f"{EXPERIMENT}-{name}"
+        with suppress(MlflowException):  # it is there already
+            self._client.create_registered_model(registered)
+        self._client.create_model_version(
+            registered, logged.model_uri, self._id, model_id=logged.model_id
+        )
 
     def fail(self, reason: str) -> None:
         """Record why the stage has no results."""
@@ -158,6 +186,8 @@ class _Run:
         self._end("FAILED")
 
     def _end(self, status: str) -> None:
+        if self._monitor is not None:
+            self._monitor.finish()
         self._client.set_terminated(self._id, status)
         self._client.set_terminated(self._parent, status)
 

@@ -24,9 +24,10 @@ class StageFiles:
     """Name in dvc.yaml, such as ``train_policy@place``."""
     key: str
     """Hash of the command, the dependencies and the parameters."""
-    dependencies: tuple[str, ...]
-    outputs: Mapping[str, str | None]
+    dependencies: Mapping[str, str | None]
     """Paths with their md5, where known."""
+    outputs: Mapping[str, str | None]
+    """As ``dependencies``."""
     parameters: Mapping[str, Any]
     """Values by dotted name."""
 
@@ -39,7 +40,7 @@ class StageFiles:
         return cls(
             address=address,
             key=sha256(text.encode()).hexdigest(),
-            dependencies=tuple(sorted(dependencies)),
+            dependencies=dependencies,
             outputs={item["path"]: item.get("md5") for item in entry.get("outs", ())},
             parameters=entry.get("params", {}).get(PARAMS.name, {}),
         )
