@@ -29,6 +29,9 @@ ELEVEN = [f"(on b{number} right)" for number in range(1, 12)]
         ("into_shelf_24cm", ["(on red board)"], 2),
         ("into_shelf_45cm", ["(on red board)"], 2),
         ("out_of_shelf_24cm", ["(on red left)"], 2),
+        # 13 cm high: a box comes and goes backwards, there is no room to lift it.
+        ("into_low_shelf", ["(on red board)"], 2),
+        ("out_of_low_shelf", ["(on red left)"], 2),
         # What no goal needs may stand near an edge, or be too wide for the hand.
         ("edge_3mm", ["(on green left)"], 2),
         ("ungraspable_bystander", ["(on red right)"], 2),

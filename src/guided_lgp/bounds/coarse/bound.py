@@ -12,6 +12,7 @@ from guided_lgp.bounds.coarse.facts import Facts
 from guided_lgp.bounds.coarse.formulation import Formulation, Formulator
 from guided_lgp.bounds.coarse.solver import Settings, Solution, Solver, default_solver
 from guided_lgp.bounds.coarse.starts import Starts
+from guided_lgp.bounds.coarse.variants import Variant, Variants
 from guided_lgp.bounds.deadline import NEVER, Deadline
 from guided_lgp.bounds.goals import NO_TERMS, GoalTerms
 from guided_lgp.bounds.program.geometry import Margins, SceneGeometry
@@ -28,8 +29,7 @@ class CoarseSolution(CoarseResult):
     """A coarse result that remembers where its solver stopped, to start longer skeletons."""
 
     values: Array | None = field(default=None, compare=False, repr=False)
-    sides: tuple[int, ...] = field(default=(), compare=False, repr=False)
-    """On which of the sides that fingers can close on each grip does."""
+    variant: Variant = field(default=Variant(), compare=False, repr=False)
 
 
 class CoarseBound:
@@ -163,8 +163,9 @@ class CoarseBound:
         self._deadline.check()
         kept = prefix if number == 0 or number % 2 else None
         generator = _generator(programs.skeleton, number)
-        sides = programs.sides(number, generator, () if kept is None else kept.sides)
-        formulation = programs.built(number, sides)
+        variant = Variant() if kept is None else kept.variant
+        variant = programs.variants.of(number, generator, variant)
+        formulation = programs.built(number, variant)
         start = self._starts.draw(
             formulation,
             generator,
@@ -177,7 +178,7 @@ class CoarseBound:
             same = np.array_equal(solution.values[: len(kept.values)], kept.values)
             verified = len(programs.skeleton) - 1 if same else 0
         result = self._check(programs, formulation, solution, number + 1, verified)
-        return replace(result, sides=sides)
+        return replace(result, variant=variant)
 
     def _check(
         self,
@@ -222,45 +223,24 @@ _MARGINS = (
 
 
 class _Programs:
-    """The programs of a skeleton, by margins and sides, built when a start needs them."""
+    """The programs of a skeleton, by margins and variant, built when a start needs them."""
 
     def __init__(self, geometry: SceneGeometry, skeleton: Skeleton, goals: GoalTerms) -> None:
         self.skeleton = skeleton
         self.goals = goals
         self._geometry = geometry
-        self._choices = tuple(_choices(geometry, skeleton))
-        self._built: dict[tuple[int, tuple[int, ...]], Formulation] = {}
+        self.variants = Variants(geometry, skeleton)
+        self._built: dict[tuple[int, Variant], Formulation] = {}
 
-    def sides(
-        self, number: int, generator: np.random.Generator, kept: tuple[int, ...]
-    ) -> tuple[int, ...]:
-        """Where the grips close in a start: as in what is kept; new ones try one after the other.
-
-        Every other start keeps nothing and draws them.
-        """
-        if number and number % 2 == 0:
-            return tuple(int(generator.integers(n)) if n > 1 else 0 for n in self._choices)
-        turn = (number + 1) // 2
-        return kept + tuple(turn % count for count in self._choices[len(kept) :])
-
-    def built(self, number: int, sides: tuple[int, ...]) -> Formulation:
+    def built(self, number: int, variant: Variant) -> Formulation:
         """The program that a start solves."""
         margins = number % len(_MARGINS)
-        if (margins, sides) not in self._built:
+        if (margins, variant) not in self._built:
             formulator = Formulator(
-                self._geometry, _MARGINS[margins], self.goals.lasting, self.goals.final, sides
+                self._geometry, _MARGINS[margins], self.goals.lasting, self.goals.final, variant
             )
-            self._built[margins, sides] = formulator.build(self.skeleton)
-        return self._built[margins, sides]
-
-
-def _choices(geometry: SceneGeometry, skeleton: Skeleton) -> Iterator[int]:
-    """On how many sides each grip of a skeleton can close; 1 where it is on none."""
-    arms = geometry.scene.robot.description.arms
-    for ground in map(geometry.domain.bind, skeleton):
-        if ground.parent in arms:
-            widest = arms[ground.parent].fingers.grasp_width
-            yield max(1, len(geometry.grasp_sides(ground.body, widest)))
+            self._built[margins, variant] = formulator.build(self.skeleton)
+        return self._built[margins, variant]
 
 
 _PROVED = "proved for the arm alone, collisions left out"

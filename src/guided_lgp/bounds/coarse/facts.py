@@ -93,6 +93,8 @@ class Facts:
                 gripper = term.symbols[0]
                 lines = straight_lines(ground.motion)
                 own = tuple(line for line in lines if line.gripper == gripper)
+                if self._geometry.overhung:  # what comes from above may take a low way instead
+                    own = tuple(line for line in own if not line.up)
                 yield Hold(gripper, ground.body, support, own, loaded)
 
     def _moved(

@@ -13,8 +13,9 @@ from inspect import signature
 
 import numpy as np
 
+from guided_lgp.bounds.coarse.variants import Variant
 from guided_lgp.bounds.program.arrays import Instance, Program
-from guided_lgp.bounds.program.context import Aim, Context, Line, Start
+from guided_lgp.bounds.program.context import LOW, Aim, Context, Line, Start
 from guided_lgp.bounds.program.geometry import Margins, SceneGeometry
 from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.bounds.program.slots import ArmConfiguration, HeldBox, KeyframeSlots
@@ -51,7 +52,7 @@ class Formulator:
         margins: Margins,
         lasting: Iterable[GroundTerm] = (),
         final: Sequence[GroundTerm] = (),
-        sides: Sequence[int] = (),
+        variant: Variant | None = None,
     ) -> None:
         """Begin a program.
 
@@ -60,10 +61,12 @@ class Formulator:
             margins: distances that it keeps.
             lasting: terms that hold all the time.
             final: terms that hold at the end.
-            sides: where each grip closes, see :class:`Context`.
+            variant: its discrete choices; the first of each if not given.
         """
         robot = kinematics_of(geometry.scene.robot.description)
         self._domain = geometry.domain
+        self._variant = variant or Variant()
+        sides = self._variant.sides
         self._context = Context(geometry, robot, kernel_table(robot), margins, sides)
         self._final = final
         for term in lasting:
@@ -82,7 +85,8 @@ class Formulator:
         self._aim(last)
         for ground in actions:
             action = ground.action
-            context.begin(successor(context.state, action), straight_lines(ground.motion))
+            lines = straight_lines(ground.motion, self._variant.is_low(context.action + 1))
+            context.begin(successor(context.state, action), lines)
             at_switch.append(self._contact(ground))
             self._switch(ground)
             after_action.append(context.keyframe())
@@ -161,17 +165,20 @@ class Formulator:
                 keep_clear(self._context, gripper, standing.joints, body)
 
 
-def straight_lines(motion: Iterable[GroundTerm]) -> tuple[Line, ...]:
-    """The straight ways of a motion to and from its switch."""
-    return tuple(
-        Line(
-            gripper=step.symbols[0],
-            back=float(step.options.get("back", 0.0)),
-            up=float(step.options.get("down", 0.0)) + _SHARE * float(step.options.get("up", 0.0)),
-        )
-        for step in motion
-        if step.name in ("line_in", "line_out")
-    )
+def straight_lines(motion: Iterable[GroundTerm], low: bool = False) -> tuple[Line, ...]:
+    """The straight ways of a motion to and from its switch.
+
+    Args:
+        motion: steps.
+        low: whether ways along the vertical are low ones instead.
+    """
+    return tuple(_line(step, low) for step in motion if step.name in ("line_in", "line_out"))
+
+
+def _line(step: GroundTerm, low: bool) -> Line:
+    gripper, back = step.symbols[0], float(step.options.get("back", 0.0))
+    up = float(step.options.get("down", 0.0)) + _SHARE * float(step.options.get("up", 0.0))
+    return Line(gripper, *LOW) if low and up else Line(gripper, back, up)
 
 
 _SHARE = 0.5

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from guided_lgp.bounds.program.context import LOW
 from guided_lgp.bounds.results import Array
 from guided_lgp.errors import InputError
 from guided_lgp.logic import Action, Domain, GroundInstruction, GroundTerm
@@ -51,6 +52,10 @@ _ASIDE = tuple(
     for x, y in ((0.07, 0.0), (0.0, 0.07), (-0.07, 0.0), (0.0, -0.07))
 )
 """Ways (m) up from a place past an arm that leans over it."""
+
+
+_LOW = Way(1.0, back=LOW[0], up=LOW[1])
+"""The way of a box out of and into where something is above it."""
 
 
 @dataclass(frozen=True)
@@ -132,17 +137,17 @@ def check_motions(domain: Domain) -> None:
 def _way_in(where: str, step: GroundTerm) -> Line:
     direction, length, otherwise = _direction(where, step)
     ways = [_straight(name, length) for name in (direction, otherwise) if name]
-    return Line(step.symbols[0], tuple(ways), _ASIDE if direction == "down" else ())
+    return Line(step.symbols[0], tuple(ways), (*_ASIDE, _LOW) if direction == "down" else ())
 
 
 def _way_out(where: str, step: GroundTerm) -> Line:
-    """What is lifted may also leave its support backwards, or half as far; a hand that cannot
+    """What is lifted may also leave its support backwards, half as far, or low; a hand that cannot
     leave backwards rises at the same time, or rises past the body.
     """
     direction, length, otherwise = _direction(where, step)
     ways = [_straight(direction, length)]
     if direction == "up":
-        ways += [Way(length, up=0.8, back=0.6), Way(0.5 * length, up=1.0)]
+        ways += [Way(length, up=0.8, back=0.6), Way(0.5 * length, up=1.0), _LOW]
     if otherwise:
         ways += [Way(length, up=0.5, back=1.0), Way(_PAST, up=1.0)]
     return Line(step.symbols[0], tuple(ways))

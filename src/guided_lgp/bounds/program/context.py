@@ -42,6 +42,11 @@ class Line:
     up: float
 
 
+LOW = (0.2, 0.016)
+"""Back and up (m) of a low straight way of a hand with its box, below something: as far as a box is
+long, so that little of it is left there, and clear of its support where the hand is not level."""
+
+
 class Context:
     """The geometry of the mode tree while a skeleton is walked; terms read it and add to it."""
 

@@ -10,6 +10,7 @@ from guided_lgp.bounds.results import Array
 from guided_lgp.poses import apply, inverse, pose, yaw_of
 from guided_lgp.scene import Scene
 from guided_lgp.scene.bodies import Body
+from guided_lgp.scene.footprints import gap
 from guided_lgp.scene.model import Column, grasp_axes
 from guided_lgp.scene.shapes import Convex, Vector
 
@@ -72,6 +73,8 @@ class SceneGeometry:
         """What may be moved."""
         columns = map(self._add, _lower_parts(scene.robot.columns))
         self.obstacles = (*columns, *map(self._add, scene.obstacles))
+        self.overhung = frozenset(filter(self._is_overhung, self.supports))
+        """What is, in part, below other furniture or an obstacle."""
 
     def _add(self, body: Body | Column) -> str:
         half, (x, y, z), yaw = level_box(body)
@@ -81,6 +84,21 @@ class SceneGeometry:
         )
         self.poses[body.name] = (*self.in_robot(x, y, yaw), z + float(self._shift[2]))
         return body.name
+
+    def _is_overhung(self, name: str) -> bool:
+        top = self.poses[name][3] + self.bodies[name].half[2]
+        return any(
+            self.poses[other][3] - self.bodies[other].half[2] >= top
+            and gap(self._outline(name), self._outline(other)) < 0
+            for other in (*self.supports, *self.obstacles)
+            if other != name
+        )
+
+    def _outline(self, name: str) -> Array:
+        """Corners (4, 2) of a body, seen from above (m)."""
+        x, y, yaw, _ = self.poses[name]
+        corners = np.array([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]])
+        return apply(pose((x, y, 0), yaw), corners * self.bodies[name].half)[:, :2]
 
     def in_robot(self, x: float, y: float, yaw: float) -> tuple[float, float, float]:
         """x, y and yaw in the robot's frame of a place in the world."""

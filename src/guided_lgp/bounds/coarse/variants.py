@@ -1,0 +1,79 @@
+"""The discrete choices in the program of a skeleton, which starts make in turns.
+
+A grip closes on one of the pairs of sides that the hand can take. Below something, a box comes and
+goes by a low straight way as well as from above.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from guided_lgp.bounds.program.geometry import SceneGeometry
+from guided_lgp.logic import Skeleton, State, successor
+from guided_lgp.logic.domain import GroundInstruction
+
+
+@dataclass(frozen=True)
+class Variant:
+    """What is chosen; the first of each where nothing is said."""
+
+    sides: tuple[int, ...] = ()
+    """For each grip, on which of the sides that the hand can close on."""
+    low: tuple[int, ...] = ()
+    """For each action, whether its box takes a low way (1) or one from above (0)."""
+
+    def is_low(self, action: int) -> bool:
+        """Whether the box of an action takes a low way."""
+        return action < len(self.low) and self.low[action] == 1
+
+
+class Variants:
+    """The choices that a skeleton leaves."""
+
+    def __init__(self, geometry: SceneGeometry, skeleton: Skeleton) -> None:
+        grounds = [geometry.domain.bind(action) for action in skeleton]
+        self._sides = [count for ground in grounds for count in _sides(geometry, ground)]
+        self._low = list(_ways(geometry, grounds))
+
+    def of(self, number: int, generator: np.random.Generator, kept: Variant) -> Variant:
+        """What a start chooses.
+
+        Args:
+            number: of the start.
+            generator: for every other start, which keeps nothing and draws.
+            kept: of the prefix; the last action tries one choice after the other.
+        """
+        if number and number % 2 == 0:
+            return Variant(_drawn(generator, self._sides), _drawn(generator, self._low))
+        turn, new = (number + 1) // 2, self._sides[len(kept.sides) :]
+        sides = tuple(turn % count for count in new)
+        turn //= max(new, default=1)
+        low = tuple(turn % count for count in self._low[len(kept.low) :])
+        return Variant(kept.sides + sides, kept.low + low)
+
+
+def _drawn(generator: np.random.Generator, counts: list[int]) -> tuple[int, ...]:
+    return tuple(int(generator.integers(count)) if count > 1 else 0 for count in counts)
+
+
+def _sides(geometry: SceneGeometry, ground: GroundInstruction) -> Iterator[int]:
+    """On how many sides the grip that an action begins can close; 1 where it is on none."""
+    arm = geometry.scene.robot.description.arms.get(ground.parent)
+    if arm is not None:
+        yield max(1, len(geometry.grasp_sides(ground.body, arm.fingers.grasp_width)))
+
+
+def _ways(geometry: SceneGeometry, grounds: list[GroundInstruction]) -> Iterator[int]:
+    """How many straight ways every action's box has."""
+    state = geometry.scene.state
+    for ground in grounds:
+        below = ground.body if ground.into_hand else ground.parent
+        yield 2 if geometry.overhung and _root(state, below) in geometry.overhung else 1
+        state = successor(state, ground.action)
+
+
+def _root(state: State, name: str) -> str:
+    """What a body stands on in the end."""
+    support = state.support_of(name)
+    return name if support is None else _root(state, support)
