@@ -55,7 +55,7 @@ UPRIGHT = 0.05  # tilt (rad) up to which a box is upright on its way
 ROUNDING = 1e-3  # relative in velocities, absolute in joint positions
 
 Kind = (
-    Literal["format", "logic", "attachment", "order", "keyframe", "goal"]
+    Literal["format", "logic", "attachment", "order", "keyframe", "goal", "start"]
     | Literal["limit", "velocity", "mimic", "grasp", "fingers", "support", "collision"]
 )
 
@@ -104,6 +104,7 @@ class Plan:
     actions: list[tuple[str, ...]]
     joints: list[str]
     fixed: dict[str, float]
+    start: dict[str, float]  # where the scene has joints at first, if not at home
     times: np.ndarray  # (n,)
     q: np.ndarray  # (n, joints)
     attachments: list[Attachment]
@@ -132,7 +133,7 @@ def check(document: Mapping[str, Any]) -> list[Fault]:
     faults = [*robot.unknown(), *_legal(plan)]
     if faults:
         return faults
-    faults += [*_limits(plan, robot), *_velocities(plan, robot), *_mimics(plan)]
+    faults += [*_starts(plan), *_limits(plan, robot), *_velocities(plan, robot), *_mimics(plan)]
     links, tools = robot.forward(plan.q)
     motion = Motion(links, tools, _carry(plan, tools))
     try:
@@ -199,6 +200,7 @@ def _read(document: Mapping[str, Any]) -> Plan:
         actions=[_atom(action, ACTIONS) for action in document["actions"]],
         joints=list(document["joint_names"]),
         fixed={name: float(value) for name, value in document["fixed_joints"].items()},
+        start={name: float(value) for name, value in placed.get("joints", {}).items()},
         times=np.array(path["times"], float),
         q=np.array(path["q"], float),
         attachments=_merged(
@@ -628,6 +630,13 @@ def _vertices(item: Any) -> np.ndarray:
 
 def _corners(size: Sequence[float]) -> np.ndarray:
     return np.array(list(itertools.product((-0.5, 0.5), repeat=3))) * size
+
+
+def _starts(plan: Plan) -> Iterator[Fault]:
+    for name, value in plan.start.items():
+        found = plan.q[0, plan.joints.index(name)]
+        if abs(found - value) > ROUNDING:
+            yield Fault("start", 0, f"{name} starts at {found:.3f}, in the scene at {value:.3f}")
 
 
 def _limits(plan: Plan, robot: Robot) -> Iterator[Fault]:

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -20,7 +21,7 @@ from pydantic import (
 
 from guided_lgp.documents import read_json
 from guided_lgp.domains import PAPER, domain_names, load_domain
-from guided_lgp.faults import Document, first_fault, refuse_unknown
+from guided_lgp.faults import Document, brief, first_fault, refuse_unknown
 from guided_lgp.logic import State, Symbols
 from guided_lgp.poses import Array, compose, pose, quaternion
 from guided_lgp.robots import Robot, load_robot, tilted_robot
@@ -61,6 +62,8 @@ class PlacedRobot(BaseModel):
     """Of the base link above the floor (m); above it, a level robot stands on a column."""
     tilt: tuple[Angle, Angle] = (0.0, 0.0)
     """Roll and pitch (rad) of the base link, before its yaw: for an arm on a wall or a ceiling."""
+    joints: dict[str, Angle] = Field(default_factory=dict)
+    """Where joints of arms are at the start (rad, or m); the others are as at home."""
 
     @property
     def description(self) -> Robot:
@@ -86,6 +89,14 @@ class PlacedRobot(BaseModel):
         """Values (rad, or m) of the joints that stay as they are, by the joint's name."""
         joints = self.description.fixed_joints
         return {fixed.joint: self.__pydantic_extra__[name] for name, fixed in joints.items()}
+
+    @property
+    def start(self) -> Array:
+        """Configuration (n,) at the start."""
+        robot, q = self.description, self.description.home.copy()
+        for joint, value in self.joints.items():
+            q[robot.joint_names.index(joint)] = value
+        return q
 
     @property
     def columns(self) -> tuple[Column, ...]:
@@ -134,6 +145,14 @@ class PlacedRobot(BaseModel):
         return data | {name: data.get(name, value) for name, value in defaults.items()}
 
     @model_validator(mode="after")
+    def _known_joints(self) -> Self:
+        for joint in self.joints:
+            if joint not in self.description.joint_names:
+                near = ", ".join(get_close_matches(joint, self.description.joint_names, 3, 0.0))
+                raise ValueError(f"joints: no arm has a joint {brief(joint)} ({near}, ...)")
+        return self
+
+    @model_validator(mode="after")
     def _mirror_images(self) -> Self:
         mirrored = any(arm.mirror_of for arm in self.description.arms.values())
         if mirrored and abs(math.sin(self.tilt[0])) > _LEVEL:
@@ -142,12 +161,14 @@ class PlacedRobot(BaseModel):
 
     @model_serializer(mode="wrap")
     def _without_floor(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Version 1 of the document has neither height nor tilt."""
+        """Version 1 of the document has neither height nor tilt nor joints."""
         document: dict[str, Any] = serialize(self)
         if not self.height:
             del document["height"]
         if not any(self.tilt):
             del document["tilt"]
+        if not self.joints:
+            del document["joints"]
         return document
 
 

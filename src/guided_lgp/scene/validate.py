@@ -43,6 +43,11 @@ def _validate_robot(scene: Scene, where: str) -> None:
             unit = robot.description.joints[fixed.joint].unit
             fault = f"{value} {unit} is out of range"
             raise InputError(f"{where}: robot.{name}", fault, f"{low} to {high}")
+    for joint, value in scene.robot.joints.items():
+        low, high = robot.position_limits[robot.joint_names.index(joint)].tolist()
+        if not low <= value <= high:
+            accepted = f"{low:.4g} to {high:.4g}"
+            raise InputError(f"{where}: robot.joints.{joint}", f"{value} is out of range", accepted)
 
 
 def _validate_tables(scene: Scene, where: str) -> None:
@@ -99,10 +104,12 @@ def _support(scene: Scene, box: Box) -> Table | Box:
 
 
 def _validate_overlaps(scene: Scene, where: str) -> None:
-    world = world_of(scene)
-    world.set(scene.robot.description.home, initial_poses(scene))
+    """At the start, and with all arms at their side, where they go first."""
+    world, robot = world_of(scene), scene.robot
     supports = {frozenset((box.name, box.on)) for box in scene.movable}
-    for overlap in world.penetrations(OVERLAP):
-        if overlap.bodies not in supports:
-            fault = f"{overlap.first} and {overlap.second} overlap by {overlap.depth:.3f} m"
-            raise InputError(f"{where}: boxes", fault)
+    for q, field in ((robot.description.home, "boxes"), (robot.start, "robot.joints")):
+        world.set(q, initial_poses(scene))
+        for overlap in world.penetrations(OVERLAP):
+            if overlap.bodies not in supports:
+                fault = f"{overlap.first} and {overlap.second} overlap by {overlap.depth:.3f} m"
+                raise InputError(f"{where}: {field}", fault)

@@ -103,7 +103,7 @@ class World:
         self._parts = {name: part for part, name in self._names.items()}
         self._filter_pairs()
         self._dressed = False
-        self.set(self._description.home, initial_poses(scene))
+        self.set(scene.robot.start, initial_poses(scene))
 
     def __enter__(self) -> "World":
         return self

@@ -25,7 +25,7 @@ class _Stage:
     def __init__(self, scene: Scene, world: World) -> None:
         self._robot = scene.robot.description
         self._world = world
-        self._q: Array = scene.robot.description.home
+        self._q: Array = scene.robot.start
         self._fingers: dict[str, float] = {}
 
     def configure(self, joints: Mapping[str, float]) -> None:

@@ -46,8 +46,8 @@ class RobotShapes:
         for index in range(1, self._model.njoints):
             parent = self._paths[self._model.parents[index]]
             self._paths.append(f"{parent}/{self._model.names[index]}")
-        home = dict(zip(self._robot.joint_names, self._robot.home.tolist(), strict=True))
-        self.configure({**scene.robot.fixed_values, **home})
+        start = dict(zip(self._robot.joint_names, scene.robot.start.tolist(), strict=True))
+        self.configure({**scene.robot.fixed_values, **start})
 
     def configure(self, joints: Mapping[str, float]) -> dict[str, Array]:
         """Move joints by name (rad, m where prismatic); the others stay.

@@ -93,10 +93,14 @@ class PathBound:
                 self._goals,
             )
             limit = self._mover.queries + _QUERIES * (len(skeleton) + 4)
-            outcomes = self._search(task, OutcomeSampler(task), limit, 0, task.start)
+            gathered = task.gathered()
+            if gathered is None:
+                continue
+            first, situation = gathered
+            outcomes = self._search(task, OutcomeSampler(task), limit, 0, situation)
             if not isinstance(outcomes, list):
                 continue
-            steps = [step for outcome in outcomes for step in outcome.steps]
+            steps = [*first, *(step for outcome in outcomes for step in outcome.steps)]
             for chosen in (optimise(self._mover, steps), steps):
                 trajectory = assemble(self._mover.robot, task.start, chosen)
                 report = verify_path(self._world, skeleton, trajectory, self._goals)

@@ -109,10 +109,10 @@ class Situation:
 
 
 def situation_at_start(scene: Scene, upright: frozenset[str] = frozenset()) -> Situation:
-    """Where a plan begins: the arms at their side, the hands closed."""
+    """Where a plan begins: the arms where the scene has them, the hands closed."""
     robot = scene.robot.description
     fingers = {gripper: arm.fingers.closed for gripper, arm in robot.arms.items()}
-    return Situation(scene.state, robot.home, fingers, initial_poses(scene), {}, upright)
+    return Situation(scene.state, scene.robot.start, fingers, initial_poses(scene), {}, upright)
 
 
 def tool_pose(arm: PlacedArm, q: Array) -> Array:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
+from itertools import permutations
 
 import numpy as np
 
@@ -29,6 +30,8 @@ Choice = tuple[int, int, int]
 class Stage(IntEnum):
     """How far an action had come when an obstacle was met."""
 
+    START = -1
+    """The arms go to their side from where they start."""
     REACH = 0
     CONTACT = 1
     OFF = 2
@@ -202,6 +205,21 @@ class Task:
         if situation.loaded(gripper) or np.array_equal(now, arm.home):
             return []
         return self.transit(situation.around(gripper), now, arm.home, keep_level=False)
+
+    def gathered(self) -> tuple[list[Motion], Situation] | None:
+        """All arms go to their side from where they start, in an order in which they can."""
+        for order in permutations(self.arms):
+            steps, situation = list[Motion](), self.start
+            for gripper in order:
+                motions = self.home(situation, gripper)
+                if motions is None:
+                    break
+                steps += motions
+                situation = self.after(situation, motions)
+            else:
+                return steps, situation
+        self.record(0, Stage.START, "no way from the start to the arms' side")
+        return None
 
     def after(self, situation: Situation, steps: Sequence[Step]) -> Situation:
         """The situation after steps."""

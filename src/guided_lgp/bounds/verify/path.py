@@ -20,7 +20,7 @@ from guided_lgp.scene.world import World, initial_poses
 JUDGED = 10
 """PyBullet judges at least every so-many-th configuration: steps of at most 10 cm."""
 START = 1e-3
-"""How far (rad) the first configuration may be off all arms at their side."""
+"""How far (rad) the first configuration may be off the scene's."""
 
 
 @dataclass(frozen=True)
@@ -40,12 +40,11 @@ def verify_path(
 ) -> PathReport:
     """Check a whole motion.
 
-    The motion starts with all arms at their side and the boxes where the scene has them. It
-    stays within the limits of position, velocity and acceleration; grasps and places happen in
-    the skeleton's order, each with the gripper really at the box and the box properly on its
-    support; boxes move only with a gripper; nothing collides on the way, looked at in steps of
-    at most 1 cm of the fastest point (see :class:`_Collisions`); and at the end every box is
-    where the skeleton leaves it.
+    The motion starts with arms and boxes where the scene has them. It stays within the limits of
+    position, velocity and acceleration; grasps and places happen in the skeleton's order, each with
+    the gripper really at the box and the box properly on its support; boxes move only with a
+    gripper; nothing collides on the way, looked at in steps of at most 1 cm of the fastest point
+    (see :class:`_Collisions`); and at the end every box is where the skeleton leaves it.
 
     Args:
         world: of the scene.
@@ -62,7 +61,7 @@ def verify_path(
     fault = rate_faults(robot, q, trajectory.times) or finger_faults(
         world.scene, skeleton, switches, q, trajectory.times
     )
-    away = float(np.abs(q[0, : len(robot.joint_names)] - robot.home).max())
+    away = float(np.abs(q[0, : len(robot.joint_names)] - world.scene.robot.start).max())
     if fault is None and away > START:
         fault = Violation("start", away, 0, 0.0)
     if fault is not None:
