@@ -88,6 +88,11 @@ class CollisionChecker:
         self._pairs = np.nonzero(np.triu(self._candidates, 1))
         for first, second in zip(*self._pairs, strict=True):
             self._geometry.addCollisionPair(pin.CollisionPair(int(first), int(second)))
+        shapes = [body.geometry for body in self._geometry.geometryObjects]
+        for shape in shapes:
+            shape.computeLocalAABB()
+        self._centres = [np.array(shape.aabb_center) for shape in shapes]
+        self._radii = np.array([shape.aabb_radius for shape in shapes])
         self._data = self._model.createData()
         self._geometry_data = self._geometry.createData()
         for request in self._geometry_data.collisionRequests:
@@ -233,19 +238,29 @@ class CollisionChecker:
         values, gradients = np.empty((len(q), count)), np.empty((len(q), count, q.shape[1]))
         for row, coordinates in enumerate(self.coordinates(q, fingers)):
             pin.computeJointJacobians(self._model, self._data, coordinates)
-            pin.computeDistances(
-                self._model,
-                self._data,
-                self._geometry,
-                self._geometry_data,
-                coordinates,
+            pin.updateGeometryPlacements(
+                self._model, self._data, self._geometry, self._geometry_data
             )
-            results = self._geometry_data.distanceResults
-            found = np.array([results[pair].min_distance for pair in self._active])
-            for column, number in enumerate(np.argsort(found, kind="stable")[:count]):
-                values[row, column] = found[number]
-                gradients[row, column] = self._gradient(self._active[number])
+            for column, (distance, pair) in enumerate(self._nearest(count)):
+                values[row, column] = distance
+                gradients[row, column] = self._gradient(pair)
         return values, gradients
+
+    def _nearest(self, count: int) -> list[tuple[float, int]]:
+        """Distance and number of the nearest pairs, of those whose spheres are near enough."""
+        spheres = zip(self._geometry_data.oMg, self._centres, strict=True)
+        centres = np.array([placement.act(centre) for placement, centre in spheres])
+        first, second = self._apart.T
+        between = np.linalg.norm(centres[first] - centres[second], axis=1)
+        least = (between - self._radii[first] - self._radii[second]).tolist()
+        found: list[tuple[float, int]] = []
+        for place in np.argsort(least, kind="stable"):
+            if len(found) >= count and least[place] > found[count - 1][0]:
+                break
+            pair = self._active[place]
+            result = pin.computeDistance(self._geometry, self._geometry_data, pair)
+            found = sorted([*found, (result.min_distance, pair)])
+        return found[:count]
 
     def _gradient(self, pair: int) -> Array:
         """Derivative (n,) of the distance of a pair of bodies, at their nearest points."""
@@ -260,7 +275,7 @@ class CollisionChecker:
             jacobian = pin.getJointJacobian(
                 self._model, self._data, joint, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
             )[:, self._velocity_at]
-            arm = np.cross(point - self._data.oMi[joint].translation, result.normal)
+            arm = pin.skew(point - self._data.oMi[joint].translation) @ result.normal
             rates.append(result.normal @ jacobian[:3] + arm @ jacobian[3:])
         return np.asarray(rates[1] - rates[0])
 
