@@ -49,6 +49,27 @@ def _assert_jacobian(kernel: Kernel, rng: np.random.Generator) -> None:
         assert transposed[j] == pytest.approx(expected, abs=1e-5), kernel.name
 
 
+def test_rows_change_by_no_more_than_their_levers_say() -> None:
+    scene = generate("a", 1, 11, "x").scenes[0]
+    skeleton = parse_skeleton("(grasp pr2L red) (place pr2L red green) (grasp pr2R green)")
+    formulation = Formulator(SceneGeometry(scene), Margins()).build(skeleton)
+    program, rng = formulation.program, np.random.default_rng(5)
+    starts = np.append(program.input_start, len(program.inputs))
+    interpreter, known = Interpreter(load_robot("pr2")), np.isfinite(program.levers)
+    assert known.mean() > 0.5
+    low, high = program.lower[: program.variables], program.upper[: program.variables]
+    for spread in (1e-3, 0.1, 1.0):
+        values = np.concatenate([rng.uniform(low, high), formulation.constants])
+        moved = values.copy()
+        moved[: program.variables] += rng.normal(scale=spread, size=program.variables)
+        change = interpreter.residuals(program, moved) - interpreter.residuals(program, values)
+        ways = program.levers * np.abs(moved - values)[program.inputs]
+        for i in range(program.instances):
+            inputs, rows = (slice(*at[i : i + 2]) for at in (starts, program.row_start))
+            if known[inputs].all():
+                assert np.abs(change[rows]).max() <= ways[inputs].sum() + 1e-9
+
+
 @pytest.mark.parametrize(
     "skeleton",
     [

@@ -32,7 +32,8 @@ def _source(robot: Robot) -> str:
         "LARGEST_ROWS": max(kernel.rows for kernel in table),
         "WORK": max(1, *(function.sz_w() for function in (*functions, *forms.values()))),
     }
-    loop = Path(__file__).with_name("solver.c").read_text(encoding="utf-8")
+    parts = (Path(__file__).with_name(name) for name in ("cholesky.c", "solver.c"))
+    loop = "\n".join(part.read_text(encoding="utf-8") for part in parts)
     defines = "\n".join(f"#define {name} {value}" for name, value in macros.items())
     return f"{generator.dump()}\n{defines}\n{loop}"
 

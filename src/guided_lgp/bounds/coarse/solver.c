@@ -1,14 +1,12 @@
 /* Augmented Lagrangian with Levenberg-Marquardt Gauss-Newton steps for a nonlinear program that is
  * a list of kernel instances. The translation unit starts with the generated kernels and defines
- * KERNELS (the table), REACHES (closed forms), REACH_INPUTS, LARGEST_INPUT, LARGEST_ROWS and WORK.
+ * KERNELS (the table), REACHES (closed forms), REACH_INPUTS, LARGEST_INPUT, LARGEST_ROWS and WORK;
+ * cholesky.c follows.
  * `Interpreter` in solver.py is the same algorithm on CasADi's virtual machine; keep the two alike.
- * WIDEST is explained in compiled.py.
  */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-#define PANEL 8 /* rows that are factorised side by side */
 
 typedef int (*function)(const double **, double **, int *, double *, int);
 
@@ -22,7 +20,9 @@ static const function reach_table[] = {REACHES}; /* closed forms */
 
 typedef struct {
     int variables, instances, rows;
-    const int *kernel, *input_start, *inputs, *parameter_start, *row_start;
+    const int *kernel, *input_start, *inputs;
+    const double *levers; /* how much a row changes at most per unit of each input */
+    const int *parameter_start, *row_start;
     const double *parameters;
     const double *weight, *target, *lower, *upper;
     const int *order; /* order[v]: place of variable v in the factorisation */
@@ -40,15 +40,54 @@ static void gather(const program *nlp, int i, const double *values, double *x)
         x[j] = values[inputs[j]];
 }
 
-static void residuals(const program *nlp, const double *values, double *c)
+/* Rows that were evaluated last, where, and how far each instance was from having any effect then:
+ * inequalities that are not active, nor have a multiplier, count for nothing. */
+typedef struct {
+    double *rows, *inputs, *spare;
+} memory;
+
+static void find_spare(const program *nlp, const double *multiplier, double penalty, int i,
+                       memory *last)
+{
+    double least = kernel_table[nlp->kernel[i]].equality ? -1 : HUGE_VAL;
+    for (int r = nlp->row_start[i]; r < nlp->row_start[i + 1]; r++) {
+        double above = last->rows[r] - multiplier[r] / penalty;
+        if (!(above >= least))
+            least = above;
+    }
+    last->spare[i] = 0.999 * least; /* rounding must not make it more than it is */
+}
+
+/* Whether the inputs have not changed enough since for an instance to have an effect. */
+static int is_idle(const program *nlp, int i, const double *x, const memory *last)
+{
+    if (!(last->spare[i] > 0))
+        return 0;
+    const double *levers = nlp->levers + nlp->input_start[i];
+    const double *before = last->inputs + nlp->input_start[i];
+    double way = 0;
+    for (int j = 0; j < kernel_table[nlp->kernel[i]].inputs; j++)
+        way += levers[j] * fabs(x[j] - before[j]);
+    return way < last->spare[i];
+}
+
+/* All rows; those of idle instances are left at what they were, which has the same effect: none. */
+static void residuals(const program *nlp, const double *values, const double *multiplier,
+                      double penalty, memory *last, double *c)
 {
     double x[LARGEST_INPUT], work[WORK];
     for (int i = 0; i < nlp->instances; i++) {
         gather(nlp, i, values, x);
+        if (is_idle(nlp, i, x, last))
+            continue;
         const double *arguments[] = {x, nlp->parameters + nlp->parameter_start[i]};
-        double *results[] = {c + nlp->row_start[i]};
+        double *results[] = {last->rows + nlp->row_start[i]};
         kernel_table[nlp->kernel[i]].residual(arguments, results, NULL, work, 0);
+        memcpy(last->inputs + nlp->input_start[i], x,
+               sizeof(double) * kernel_table[nlp->kernel[i]].inputs);
+        find_spare(nlp, multiplier, penalty, i, last);
     }
+    memcpy(c, last->rows, sizeof(double) * nlp->rows);
 }
 
 /* Largest violation, where inequalities may be violated by `slack`. */
@@ -86,26 +125,51 @@ static double merit(const program *nlp, const double *values, const double *c,
     return 0.5 * sum;
 }
 
-/* The lower triangle of a symmetric matrix, in elimination order: of row k the columns first[k] to k,
- * beyond which nothing is nonzero. They end at entry end[k]. */
-typedef struct {
-    int *first, *end;
-} skyline;
-
-/* Row k, such that its entry j is the one of column j. */
-static double *row_of(const skyline *shape, double *entries, int k)
+/* Whether any row of an instance counts. */
+static int is_active(const program *nlp, int i, const double *c, const double *multiplier,
+                     double penalty)
 {
-    return entries + shape->end[k] - k;
+    if (kernel_table[nlp->kernel[i]].equality)
+        return 1;
+    for (int r = nlp->row_start[i]; r < nlp->row_start[i + 1]; r++)
+        if (c[r] < multiplier[r] / penalty)
+            return 1;
+    return 0;
+}
+
+/* The shape of H where some instances are active. */
+static void find_shape(const program *nlp, const char *active, skyline *shape)
+{
+    int n = nlp->variables, *first = shape->first;
+    for (int k = 0; k < n; k++)
+        first[k] = k;
+    for (int i = 0; i < nlp->instances; i++) {
+        if (!active[i])
+            continue;
+        const int *inputs = nlp->inputs + nlp->input_start[i];
+        int count = kernel_table[nlp->kernel[i]].inputs, smallest = n;
+        for (int j = 0; j < count; j++)
+            if (inputs[j] < n && nlp->order[inputs[j]] < smallest)
+                smallest = nlp->order[inputs[j]];
+        for (int j = 0; j < count; j++)
+            if (inputs[j] < n && smallest < first[nlp->order[inputs[j]]])
+                first[nlp->order[inputs[j]]] = smallest;
+    }
+    for (int k = 0; k < n; k++)
+        shape->end[k] = k - first[k] + (k ? shape->end[k - 1] + 1 : 0);
 }
 
 /* Gradient g and Gauss-Newton matrix H. */
-static void linearise(const program *nlp, const skyline *shape, const double *values,
-                      const double *c, const double *multiplier, double penalty, double *g,
-                      double *H)
+static void linearise(const program *nlp, const double *values, const double *c,
+                      const double *multiplier, double penalty, char *active, skyline *shape,
+                      double *g, double *H)
 {
     int n = nlp->variables;
     double x[LARGEST_INPUT], work[WORK], again[LARGEST_ROWS];
     double jacobian[LARGEST_ROWS * LARGEST_INPUT];
+    for (int i = 0; i < nlp->instances; i++)
+        active[i] = (char)is_active(nlp, i, c, multiplier, penalty);
+    find_shape(nlp, active, shape);
     memset(H, 0, sizeof(double) * (shape->end[n - 1] + 1));
     for (int v = 0; v < n; v++) {
         int k = nlp->order[v];
@@ -115,10 +179,8 @@ static void linearise(const program *nlp, const skyline *shape, const double *va
     for (int i = 0; i < nlp->instances; i++) {
         const kernel_type *kernel = &kernel_table[nlp->kernel[i]];
         const int *inputs = nlp->inputs + nlp->input_start[i];
-        int first = nlp->row_start[i], active = kernel->equality;
-        for (int r = 0; !active && r < kernel->rows; r++)
-            active = c[first + r] < multiplier[first + r] / penalty;
-        if (!active)
+        int first = nlp->row_start[i];
+        if (!active[i])
             continue;
         gather(nlp, i, values, x);
         const double *arguments[] = {x, nlp->parameters + nlp->parameter_start[i]};
@@ -149,122 +211,40 @@ static void linearise(const program *nlp, const skyline *shape, const double *va
     }
 }
 
-/* The shape of H for a program. */
-static void find_shape(const program *nlp, skyline *shape)
-{
-    int n = nlp->variables, *first = shape->first;
-    for (int k = 0; k < n; k++)
-        first[k] = k;
-    for (int i = 0; i < nlp->instances; i++) {
-        const int *inputs = nlp->inputs + nlp->input_start[i];
-        int count = kernel_table[nlp->kernel[i]].inputs, smallest = n;
-        for (int j = 0; j < count; j++)
-            if (inputs[j] < n && nlp->order[inputs[j]] < smallest)
-                smallest = nlp->order[inputs[j]];
-        for (int j = 0; j < count; j++)
-            if (inputs[j] < n && smallest < first[nlp->order[inputs[j]]])
-                first[nlp->order[inputs[j]]] = smallest;
-    }
-    for (int k = 0; k < n; k++)
-        shape->end[k] = k - first[k] + (k ? shape->end[k - 1] + 1 : 0);
-}
-
-/* Row i of H + damping, with `held` variables on their own, as lane r of a panel from a column on. */
-static void load_row(const skyline *shape, double *H, const char *held, double damping, int i,
-                     int from, double *lane)
-{
-    const double *row = row_of(shape, H, i);
-    for (int k = shape->first[i]; k <= i; k++)
-        lane[(k - from) * PANEL] = held[i] || held[k] ? 0 : row[k];
-    lane[(i - from) * PANEL] = held[i] ? 1 : row[i] + damping;
-}
-
-/* Cholesky L of H + damping within the skyline; 0 if it is not positive definite. A panel is a few
- * rows side by side, which is what processors are fast at; every entry is summed in the order of
- * the columns as ever. */
-WIDEST static int factorise(int n, const skyline *shape, double *H, const char *held,
-                            double damping, double *L, double *panel)
-{
-    const int *first = shape->first;
-    for (int i = 0; i < n; i += PANEL) {
-        int end = i + PANEL < n ? i + PANEL : n, from = i;
-        for (int r = i; r < end; r++)
-            from = first[r] < from ? first[r] : from;
-        memset(panel, 0, sizeof(double) * (end - from) * PANEL);
-        for (int r = i; r < end; r++)
-            load_row(shape, H, held, damping, r, from, panel + r - i);
-        for (int j = from; j < end; j++) {
-            double sum[PANEL], *column = panel + (j - from) * PANEL;
-            const double *other = j < i ? row_of(shape, L, j) + from : panel + j - i;
-            int stride = j < i ? 1 : PANEL, start = j < i && first[j] > from ? first[j] : from;
-            memcpy(sum, column, sizeof sum);
-            for (int k = start - from; k < j - from; k++) {
-                double factor = other[k * stride];
-                for (int r = 0; r < PANEL; r++)
-                    sum[r] -= panel[k * PANEL + r] * factor;
-            }
-            if (j >= i && !(sum[j - i] > 0))
-                return 0;
-            double pivot = j < i ? other[j - from] : sqrt(sum[j - i]);
-            for (int r = 0; r < PANEL; r++)
-                column[r] = sum[r] / pivot;
-            if (j >= i)
-                column[j - i] = pivot;
-        }
-        for (int r = i; r < end; r++)
-            for (int k = first[r]; k <= r; k++)
-                row_of(shape, L, r)[k] = panel[(k - from) * PANEL + r - i];
-    }
-    return 1;
-}
-
-/* Solve (H + damping) d = -g; `held` variables do not move. */
-static int step(int n, const skyline *shape, double *H, const double *g, const char *held,
-                double damping, double *L, double *panel, double *d)
-{
-    if (!factorise(n, shape, H, held, damping, L, panel))
-        return 0;
-    for (int i = 0; i < n; i++) {
-        const double *row = row_of(shape, L, i);
-        double sum = held[i] ? 0 : -g[i];
-        for (int k = shape->first[i]; k < i; k++)
-            sum -= row[k] * d[k];
-        d[i] = sum / row[i];
-    }
-    for (int i = n - 1; i >= 0; i--) {
-        const double *row = row_of(shape, L, i);
-        d[i] /= row[i];
-        for (int k = shape->first[i]; k < i; k++)
-            d[k] -= row[k] * d[i];
-    }
-    return 1;
-}
-
 /* Values (variables first, then constants) are changed in place, c receives the residuals.
  * Returns the number of steps tried; report: largest violation. */
 int coarse_solve(const program *nlp, const settings *options, double *values, double *c,
                  double *report)
 {
     int n = nlp->variables, rows = nlp->rows, tried = 0;
-    int *places = malloc(sizeof(int) * 2 * n);
+    int *places = malloc(sizeof(int) * 4 * n);
     skyline shape = {places, places + n};
-    find_shape(nlp, &shape);
+    char *active = malloc(nlp->instances);
+    memset(active, 1, nlp->instances);
+    find_shape(nlp, active, &shape); /* the largest */
     size_t entries = shape.end[n - 1] + 1;
-    double *memory = malloc(sizeof(double) * (2 * entries + (4 + PANEL) * n + 2 * rows));
+    int last_input = nlp->instances - 1, inputs = 0;
+    if (last_input >= 0)
+        inputs = nlp->input_start[last_input] + kernel_table[nlp->kernel[last_input]].inputs;
+    double *doubles = malloc(sizeof(double) * (2 * entries + (4 + PANEL) * n + 3 * rows + inputs +
+                                               nlp->instances));
     char *held = malloc(n);
-    double *H = memory, *L = H + entries, *g = L + entries, *d = g + n, *old = d + n;
+    double *H = doubles, *L = H + entries, *g = L + entries, *d = g + n, *old = d + n;
     double *multiplier = old + n, *c_new = multiplier + rows, *panel = c_new + rows;
+    memory last = {panel + PANEL * n, panel + PANEL * n + rows, panel + PANEL * n + rows + inputs};
     double penalty = options->penalty, damping = options->damping;
 
     memset(multiplier, 0, sizeof(double) * rows);
-    residuals(nlp, values, c);
+    for (int i = 0; i < nlp->instances; i++)
+        last.spare[i] = -1;
+    residuals(nlp, values, multiplier, penalty, &last, c);
     double worst = violation(nlp, c, options->slack), best = worst;
     int improved = 0; /* step of the last good gain on the violation */
     while (worst > options->tolerance && tried < options->steps &&
            tried - improved < options->patience) {
         double value = merit(nlp, values, c, multiplier, penalty);
         for (int inner = 0; inner < options->inner && tried < options->steps; inner++) {
-            linearise(nlp, &shape, values, c, multiplier, penalty, g, H);
+            linearise(nlp, values, c, multiplier, penalty, active, &shape, g, H);
             for (int v = 0; v < n; v++) {
                 int k = nlp->order[v];
                 held[k] = (values[v] <= nlp->lower[v] && g[k] > 0) ||
@@ -276,11 +256,11 @@ int coarse_solve(const program *nlp, const settings *options, double *values, do
                 old[v] = values[v];
             while (!accepted && tried < options->steps) {
                 tried++;
-                if (step(n, &shape, H, g, held, damping, L, panel, d)) {
+                if (step(n, &shape, H, g, held, damping, L, panel, places + 2 * n, d)) {
                     for (int v = 0; v < n; v++)
                         values[v] = fmin(fmax(old[v] + d[nlp->order[v]], nlp->lower[v]),
                                          nlp->upper[v]);
-                    residuals(nlp, values, c_new);
+                    residuals(nlp, values, multiplier, penalty, &last, c_new);
                     double trial = merit(nlp, values, c_new, multiplier, penalty);
                     if (trial < value) {
                         accepted = 1;
@@ -315,10 +295,13 @@ int coarse_solve(const program *nlp, const settings *options, double *values, do
             }
         }
         penalty = fmin(penalty * options->growth, options->largest_penalty);
+        for (int i = 0; i < nlp->instances; i++)
+            find_spare(nlp, multiplier, penalty, i, &last);
     }
     *report = worst;
-    free(memory);
+    free(doubles);
     free(places);
+    free(active);
     free(held);
     return tried;
 }

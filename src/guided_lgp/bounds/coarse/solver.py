@@ -46,7 +46,7 @@ class Solution:
     values: Array
     """Variables, then constants."""
     residuals: Array
-    """(rows,), scaled."""
+    """(rows,), scaled. Inequalities that had no effect may be those of an earlier step."""
     violation: float
     """Largest violation of a row, scaled; of an inequality, beyond the slack."""
     steps: int

@@ -26,6 +26,8 @@ class Program:
     kernel: Integers
     input_start: Integers
     inputs: Integers
+    levers: Array
+    """How much a row changes at most per unit of each input; infinite where that is not known."""
     parameter_start: Integers
     row_start: Integers
     parameters: Array
@@ -82,6 +84,7 @@ class ProgramBuilder:
         self._shared: list[bool] = []
         self._kernel: list[int] = []
         self._inputs: list[int] = []
+        self._levers: list[float] = []
         self._parameters: list[float] = []
 
     def constant(self, value: float) -> int:
@@ -117,12 +120,14 @@ class ProgramBuilder:
         action: int,
         names: tuple[str, ...],
         links: tuple[str, ...] = (),
+        levers: Sequence[float] | None = None,
     ) -> None:
-        """Add an instance of a kernel; see :class:`Instance`."""
+        """Add an instance of a kernel; see :class:`Instance` and :class:`Program`."""
         number = self._table.number[kernel]
         self._kernel.append(number)
         self._inputs.extend(inputs)
         self._parameters.extend(parameters)
+        self._levers.extend([np.inf] * len(inputs) if levers is None else levers)
         self.instances.append(Instance(action, number, names, links))
 
     def build(self) -> Program:
@@ -139,6 +144,7 @@ class ProgramBuilder:
             kernel=np.array(self._kernel, dtype=np.intc),
             input_start=_column(starts, 0),
             inputs=inputs,
+            levers=np.array(self._levers),
             parameter_start=_column(starts, 1),
             row_start=_column(starts, 2),
             parameters=np.array(self._parameters),

@@ -220,9 +220,10 @@ class Context:
         parameters: Sequence[float],
         names: tuple[str, ...],
         links: tuple[str, ...] = (),
+        levers: Sequence[float] | None = None,
     ) -> None:
         """Add rows of a kernel to the program, for the action at hand."""
-        self.program.rows(kernel, inputs, parameters, self.action, names, links)
+        self.program.rows(kernel, inputs, parameters, self.action, names, links, levers)
 
     def choose(self, choice: Start) -> None:
         """Leave something to the start."""

@@ -7,7 +7,7 @@ the result over at the plane y = 0.
 """
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from typing import Any
 
 import casadi as ca
@@ -52,6 +52,26 @@ class Chain:
     """The spheres that stand for the arm against another."""
     palm_front: float
     """x of the palm's front in the tool frame (m)."""
+
+    @cached_property
+    def levers(self) -> tuple[float, ...]:
+        """How far (m) each moving joint moves the centre of a sphere at most per rad, hands open.
+
+        No centre is farther from a joint than the way along the links to it; infinite where a joint
+        that slides makes that longer.
+        """
+        found = []
+        for name in self.moving:
+            before, way, farthest = True, 0.0, 0.0
+            for joint in self.joints:
+                way += 0.0 if before else float(np.linalg.norm(joint.position))
+                if not before and joint.kind == "prismatic":
+                    way = np.inf
+                before = before and joint.name != name
+                on_link = (s.centre for s in self.spheres if not before and s.link == joint.child)
+                farthest = max([farthest, *(way + float(np.linalg.norm(c)) for c in on_link)])
+            found.append(farthest)
+        return tuple(found)
 
     def pose(self, q: Any, side: Any, fixed: Any, closed: Any = 0) -> ArmPose:
         """Forward kinematics.

@@ -52,6 +52,11 @@ def keep_apart(
         ),
         ("apart", gripper, other),
         tuple(one.links[i] for i in one.chain.against_arms for _ in range(count)),
+        tuple(
+            SCALE * (lever + context.closed(hand))
+            for hand, arm in ((gripper, one), (other, two))
+            for lever in arm.chain.levers
+        ),
     )
 
 

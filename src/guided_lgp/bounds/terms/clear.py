@@ -1,5 +1,7 @@
 """``clear(gripper, body)``: the spheres of an arm keep their distance from a level box or table."""
 
+from math import hypot
+
 import casadi as ca
 
 from guided_lgp.bounds.program.context import Context
@@ -32,18 +34,21 @@ def _kernels(robot: RobotKinematics) -> tuple[Kernel, ...]:
 def keep_clear(context: Context, gripper: str, joints: tuple[int, ...], body: str) -> None:
     """Of one configuration of an arm."""
     arm, pose = context.robot.arms[gripper], context.pose[body]
+    half, closed = context.half(body), context.closed(gripper)
+    ways = (*(lever + closed for lever in arm.chain.levers), 1.0, 1.0, hypot(*half[:2]), 1.0)
     context.rows(
         f"clear_{arm.chain.name}",
         (*joints, *pose.plane, pose.z),
         (
             *context.arm_parameters(arm),
-            context.closed(gripper),
+            closed,
             pose.offset,
-            *context.half(body),
+            *half,
             context.margins.clear,
         ),
         ("clear", gripper, body),
         arm.links,
+        tuple(SCALE * way for way in ways),
     )
 
 
