@@ -102,7 +102,7 @@ def test_heavy_packages_are_not_imported_for_help() -> None:
     loaded = subprocess.run(
         [sys.executable, "-c", code], text=True, capture_output=True, check=True
     )
-    heavy = {"numpy", "torch", "lightning", "mlflow", "pandas", "pybullet", "casadi"}
+    heavy = {"numpy", "pydantic", "torch", "lightning", "mlflow", "pandas", "pybullet", "casadi"}
     assert heavy.isdisjoint(loaded.stdout.split())
 
 

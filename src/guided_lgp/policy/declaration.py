@@ -5,13 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
-from guided_lgp.params import Params
-
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
     from guided_lgp.logic import Action, Objective, State, Symbols
+    from guided_lgp.params import Params
 
 
 class DeclaredPolicy(Protocol):
@@ -52,7 +51,7 @@ class PolicyDeclaration:
     """The stems of its files."""
     folder: str = ""
     """Where they are in a folder of models, and the reports of their training in one of reports."""
-    symmetric: Callable[[Params], bool] = lambda params: True
+    symmetric: Callable[["Params"], bool] = lambda params: True
     """Whether all boxes are alike to it, as the pipeline trains it."""
     default: bool = False
     """Whether plans follow it if nobody asks for another."""

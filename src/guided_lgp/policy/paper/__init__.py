@@ -1,10 +1,13 @@
 """The paper's hierarchical policy: one network per decision, for a fixed number of symbols."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from guided_lgp.domains import load_domain
-from guided_lgp.params import Params
 from guided_lgp.policy.declaration import DeclaredPolicy, PolicyDeclaration
+
+if TYPE_CHECKING:
+    from guided_lgp.params import Params
 
 NETWORKS = ("instruction", *(instruction.name for instruction in load_domain().instructions))
 
@@ -21,11 +24,11 @@ def _improved(directory: Path) -> DeclaredPolicy:
     return load_networks(directory, "train_improved")
 
 
-def _one_input_per_box(params: Params) -> bool:
+def _one_input_per_box(params: "Params") -> bool:
     return False
 
 
-def _boxes_of_the_goals_first(params: Params) -> bool:
+def _boxes_of_the_goals_first(params: "Params") -> bool:
     return params.build_dataset.improved.boxes != "declared"
 
 

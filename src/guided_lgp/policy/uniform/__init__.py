@@ -1,12 +1,15 @@
 """The policy that knows nothing: the control, which shows what a search does without one."""
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
-from guided_lgp.logic import Action, Objective, State, Symbols
 from guided_lgp.policy.declaration import PolicyDeclaration
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from guided_lgp.logic import Action, Objective, State, Symbols
 
 
 class Uniform:
@@ -14,13 +17,15 @@ class Uniform:
 
     def log_probabilities(
         self,
-        objective: Objective,
-        state: State,
-        symbols: Symbols,
-        positions: Mapping[str, NDArray[np.float64]],
-        actions: Sequence[Action],
-    ) -> NDArray[np.float64]:
+        objective: "Objective",
+        state: "State",
+        symbols: "Symbols",
+        positions: "Mapping[str, NDArray[np.float64]]",
+        actions: "Sequence[Action]",
+    ) -> "NDArray[np.float64]":
         """See :class:`guided_lgp.search.policy.Policy`."""
+        import numpy as np
+
         return np.full(len(actions), -np.log(len(actions)))
 
 
