@@ -48,11 +48,17 @@ def test_every_domain_of_the_project_can_be_moved(name: str) -> None:
     [
         (
             (*MOTION, fly(g)),
-            "motion of snatch: fly: is an unknown step (accepted: present,",
+            "instruction snatch, motion: fly: is an unknown step (accepted: present,",
         ),
-        (MOTION[1:], "motion of snatch: line_in, switch, line_out: are not the steps of a motion"),
+        (
+            MOTION[1:],
+            "snatch, motion: line_in, switch, line_out: are not the steps of a motion",
+        ),
         ((home(g), *MOTION), "home, transit, line_in, switch, line_out: are not the steps"),
-        ((MOTION[0], line_in(g), *MOTION[2:]), "motion of snatch: line_in: has no direction"),
+        (
+            (MOTION[0], line_in(g), *MOTION[2:]),
+            "snatch, motion: line_in: has no direction",
+        ),
         ((MOTION[0], line_in(g, left=0.1), *MOTION[2:]), "accepted: one of back, down, up with a"),
     ],
 )

@@ -31,12 +31,15 @@ def test_every_file_is_a_term() -> None:
 
 def test_an_unknown_term_is_refused_by_name() -> None:
     hand, box = load_domain().instructions[0].parameters
-    with pytest.raises(InputError, match=r"grasp: glue: is an unknown term .*apart, at, balanced"):
+    fault = r"\.py: instruction grasp, contact: glue: is an unknown term .*apart, at, balanced"
+    with pytest.raises(InputError, match=fault):
         check_terms(_with_contact(Term("hold", (hand, box)), Term("glue", (hand, box))))
 
 
 def test_a_term_with_other_arguments_is_refused_by_name() -> None:
     hand, box = load_domain().instructions[0].parameters
     for term in (Term("hold", (hand,)), Term("hold", (hand, box, box))):
-        with pytest.raises(InputError, match=r"grasp: hold: .*argument.*accepted: gripper, box"):
+        with pytest.raises(
+            InputError, match=r"grasp, contact: hold: .*argument.*accepted: gripper, box"
+        ):
             check_terms(_with_contact(term))

@@ -46,5 +46,5 @@ def test_a_row_with_an_unknown_policy_is_refused(monkeypatch: pytest.MonkeyPatch
     check_planners(POLICIES)
     row = replace(PLANNERS["guided"], policy="oracle")
     monkeypatch.setattr(planners, "PLANNERS", {"guided": row})
-    with pytest.raises(InputError, match=r"planner 'guided': policy 'oracle' is unknown .*paper"):
+    with pytest.raises(InputError, match=r"guided, policy: 'oracle' is unknown .*paper"):
         check_planners(POLICIES)

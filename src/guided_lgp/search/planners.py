@@ -251,10 +251,10 @@ def check_planners(policies: Collection[str]) -> None:
         InputError: names the row and what is known.
     """
     for planner in PLANNERS.values():
-        where = f"planner {planner.name!r}"
+        where = f"planners.py: planner {planner.name}"
         if planner.search not in SEARCHES:
-            fault = f"search {planner.search!r} is unknown"
-            raise InputError(where, fault, ", ".join(SEARCHES))
+            fault = f"{planner.search!r} is unknown"
+            raise InputError(f"{where}, search", fault, ", ".join(SEARCHES))
         if planner.policy and planner.policy not in policies:
-            fault = f"policy {planner.policy!r} is unknown"
-            raise InputError(where, fault, ", ".join(policies))
+            fault = f"{planner.policy!r} is unknown"
+            raise InputError(f"{where}, policy", fault, ", ".join(policies))

@@ -191,13 +191,16 @@ def check_terms(domain: Domain) -> None:
     Raises:
         InputError: the first for which that is not so.
     """
-    goal_types = (*domain.goal_types, *domain.further_goals)
     declared: list[tuple[str, tuple[Term, ...], tuple[Number, ...]]]
-    declared = [(one.name, one.contact, ()) for one in domain.instructions]
-    declared += [(one.name, (*one.final, *one.lasting), one.numbers) for one in goal_types]
-    for owner, terms, numbers in declared:
+    declared = [
+        (f"instruction {one.name}, contact", one.contact, ()) for one in domain.instructions
+    ]
+    for one in (*domain.goal_types, *domain.further_goals):
+        declared.append((f"goal type {one.name}, final", one.final, one.numbers))
+        declared.append((f"goal type {one.name}, lasting", one.lasting, one.numbers))
+    for field, terms, numbers in declared:
         for term in terms:
-            where = f"domain {domain.name}: {owner}: {term.name}"
+            where = f"{domain.name}.py: {field}: {term.name}"
             if term.name not in term_names():
                 raise InputError(where, "is an unknown term", ", ".join(term_names()))
             add = find_term(term.name).add

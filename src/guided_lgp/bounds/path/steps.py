@@ -91,14 +91,18 @@ class Manoeuvre:
         return self.way_in.gripper
 
 
-def manoeuvre(declared: GroundInstruction) -> Manoeuvre:
+def manoeuvre(declared: GroundInstruction, file: str = "") -> Manoeuvre:
     """Read the declared motion of an action.
+
+    Args:
+        declared: the action by its declaration.
+        file: where that is, for messages: ``"handover.py: "``.
 
     Raises:
         InputError: a step is unknown, missing or out of its order, or lacks what it needs.
     """
     name, motion = declared.action.instruction, declared.motion
-    where = f"motion of {name}"
+    where = f"{file}instruction {name}, motion"
     names = [step.name for step in motion]
     for step in names:
         if step not in STEPS:
@@ -131,7 +135,7 @@ def check_motions(domain: Domain) -> None:
     """
     for instruction in domain.instructions:
         names = tuple(parameter.name for parameter in instruction.parameters)
-        manoeuvre(domain.bind(Action(instruction.name, names)))
+        manoeuvre(domain.bind(Action(instruction.name, names)), f"{domain.name}.py: ")
 
 
 def _way_in(where: str, step: GroundTerm) -> Line:

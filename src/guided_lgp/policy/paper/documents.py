@@ -39,6 +39,20 @@ class EncodingDocument(BaseModel):
     inputs: list[str]
 
 
+class NetworkDocument(BaseModel):
+    """What the weights of a network mean."""
+
+    model_config = ConfigDict(strict=True, extra="forbid")
+
+    version: Literal[1]
+    network: str
+    sub_policies: dict[str, Annotated[list[Annotated[int, Field(ge=1)]], Field(min_length=2)]]
+    """By name: the widths of its layers, from the inputs to the classes."""
+    activation: Literal["relu"]
+    training: dict[str, Any]
+    encoding: Any
+
+
 class DatasetDocument(BaseModel):
     """What the samples mean; the names of the symbols have the keys of their types."""
 

@@ -5,9 +5,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from pydantic import ValidationError
+
 from guided_lgp.documents import read_json, write_json
 from guided_lgp.errors import InputError
+from guided_lgp.faults import first_fault
 from guided_lgp.policy.arrays import FloatArray
+from guided_lgp.policy.paper.documents import NetworkDocument
 from guided_lgp.policy.paper.encoding import VERSION, Encoding
 from guided_lgp.policy.tensors import read_weights, write_tensors
 
@@ -60,18 +64,18 @@ def load_model(directory: Path, network: str, stage: str = "train_policy") -> Mo
     """
     path = directory / f"{network}.json"
     remedy = f"version {VERSION}, the output of the stage {stage}"
-    document = read_json(path, remedy)
-    version = document.get("version") if isinstance(document, dict) else None
-    if version != VERSION:
-        raise InputError(f"{path}: version", f"is {version!r}", remedy)
-    encoding = Encoding.parse(document.get("encoding"), str(path), stage)
-    sizes = _sizes(document, network, encoding)
-    if sizes is None:
+    try:
+        document = NetworkDocument.model_validate(read_json(path, remedy))
+    except ValidationError as error:
+        raise first_fault(error, str(path), remedy) from None
+    encoding = Encoding.parse(document.encoding, str(path), stage)
+    if document.network != network or not _fit(document.sub_policies, network, encoding):
         raise InputError(f"{path}: sub_policies", "do not fit the network's chain", remedy)
     path = directory / f"{network}.safetensors"
     tensors = read_weights(path, remedy)
     sub_policies = {}
-    for name, widths in sizes.items():
+    for name in encoding.chains[network]:
+        widths = document.sub_policies[name]
         layers = []
         for index, shape in enumerate(zip(widths[1:], widths[:-1], strict=True)):
             weight = tensors.get(f"{name}.{index}.weight")
@@ -81,25 +85,14 @@ def load_model(directory: Path, network: str, stage: str = "train_policy") -> Mo
                 raise InputError(f"{path}: {name}.{index}", fault, remedy)
             layers.append((weight, bias))
         sub_policies[name] = tuple(layers)
-    return Model(network, encoding, sub_policies, document["training"])
+    return Model(network, encoding, sub_policies, document.training)
 
 
-def _sizes(document: Any, network: str, encoding: Encoding) -> dict[str, list[int]] | None:
-    """Layer sizes of each sub-policy, or None if they do not fit the chain."""
-    described = document.get("sub_policies")
-    if not isinstance(described, dict) or not isinstance(document.get("training"), dict):
-        return None
-    if network not in encoding.chains:
-        return None
-    sizes = {}
-    for name in encoding.chains[network]:
-        widths = described.get(name)
-        if not isinstance(widths, list) or len(widths) < 2:
-            return None
-        if not all(type(width) is int and width > 0 for width in widths):
-            return None
-        sizes[name] = widths
-    ends = [(widths[0], widths[-1]) for widths in sizes.values()]
-    classes = [encoding.classes(name) for name in encoding.chains[network]]
-    expected = list(zip(encoding.chain_inputs(network), classes, strict=True))
-    return sizes if ends == expected and document.get("network") == network else None
+def _fit(widths: Mapping[str, list[int]], network: str, encoding: Encoding) -> bool:
+    """Whether the sub-policies are those of the network's chain, with their inputs and classes."""
+    chain = encoding.chains.get(network, ())
+    if widths.keys() != set(chain):
+        return False
+    ends = [(widths[name][0], widths[name][-1]) for name in chain]
+    classes = map(encoding.classes, chain)
+    return ends == list(zip(encoding.chain_inputs(network), classes, strict=True))
