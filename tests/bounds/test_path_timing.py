@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from guided_lgp.bounds.path import timing
 from guided_lgp.bounds.path.timing import INTERVAL, time_path
 from guided_lgp.robots import load_robot
 
@@ -43,3 +44,12 @@ def test_no_motion_takes_no_time() -> None:
     times, rows = time_path(np.stack([ARM.home, ARM.home]), ARM)
     assert times.tolist() == [0.0]
     assert rows.shape == (1, 7)
+
+
+@pytest.mark.parametrize("path", [ENDS, _curved(), _curved()[:3]], ids=["line", "curve", "short"])
+def test_compiled_and_numpy_agree(path: np.ndarray, monkeypatch: pytest.MonkeyPatch) -> None:
+    times, rows = time_path(path, ARM)
+    monkeypatch.setattr(timing, "_library", lambda: None)
+    others, same = time_path(path, ARM)
+    assert times == pytest.approx(others, rel=1e-6)
+    assert rows == pytest.approx(same, abs=1e-6)

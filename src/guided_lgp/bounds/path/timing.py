@@ -11,10 +11,15 @@ rows meet. All pairs but those with the row of the neighbour are the same whatev
 is, and those with it are affine in it: a step of a pass is the minimum of a few affine functions.
 """
 
+import ctypes
+from functools import cache
+from pathlib import Path
+from typing import Any
+
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from guided_lgp.bounds.results import Array
+from guided_lgp.compiled import load_compiled
 from guided_lgp.robots import Arm
 
 INTERVAL = 0.05
@@ -44,10 +49,10 @@ def time_path(path: Array, arm: Arm) -> tuple[Array, Array]:
     s = np.concatenate([[0.0], np.cumsum(lengths[lengths > 1e-9])])
     if len(path) == 1:
         return np.zeros(1), path
-    curve = CubicSpline(s, path, bc_type="natural")
+    curve = Natural(s, path)
     velocity, acceleration = _SHARE * arm.velocity_limits, _SHARE * arm.acceleration_limits
     grid = np.linspace(0.0, s[-1], max(10, int(s[-1] / _GRID_STEP)))
-    speeds = np.sqrt(_fastest(grid, curve(grid, 1), curve(grid, 2), velocity, acceleration))
+    speeds = np.sqrt(fastest(grid, *curve.derivatives(grid), velocity, acceleration))
     moments = np.concatenate([[0.0], np.cumsum(2 * np.diff(grid) / (speeds[1:] + speeds[:-1]))])
     count = 1 + int(np.ceil(moments[-1] / INTERVAL))
     times, step = np.linspace(0.0, moments[-1], count, retstep=True)
@@ -56,7 +61,45 @@ def time_path(path: Array, arm: Arm) -> tuple[Array, Array]:
     return times * _stretch(rows, float(step), velocity, acceleration), rows
 
 
-def _fastest(
+class Natural:
+    """The natural cubic spline through points (m, n) at ascending parameters (m,)."""
+
+    def __init__(self, s: Array, points: Array) -> None:
+        self._s, self._points = s, np.ascontiguousarray(points)
+        self._library, self._curve = _library(), None
+        if self._library is None:
+            from scipy.interpolate import CubicSpline  # slow to import
+
+            self._curve = CubicSpline(s, points, bc_type="natural")
+            return
+        self._second = np.empty_like(self._points)
+        self._library.spline(*points.shape, *map(_at, (s, self._points, self._second)))
+
+    def __call__(self, at: Array) -> Array:
+        """Points (k, n) at ascending parameters (k,)."""
+        if self._curve is not None:
+            return np.asarray(self._curve(at))
+        value = np.empty((len(at), self._points.shape[1]))
+        self._evaluate(at, value, None, None)
+        return value
+
+    def derivatives(self, at: Array) -> tuple[Array, Array]:
+        """The first and the second (k, n)."""
+        if self._curve is not None:
+            return self._curve(at, 1), self._curve(at, 2)
+        slope, bend = np.empty((2, len(at), self._points.shape[1]))
+        self._evaluate(at, None, slope, bend)
+        return slope, bend
+
+    def _evaluate(self, at: Array, *found: Array | None) -> None:
+        assert self._library is not None
+        arrays = (self._s, self._points, self._second)
+        self._library.evaluate(
+            *self._points.shape, *map(_at, arrays), len(at), *map(_at, (at, *found))
+        )
+
+
+def fastest(
     grid: Array, slopes: Array, bends: Array, velocity: Array, acceleration: Array
 ) -> Array:
     """The largest squared path velocities (N + 1,) from rest to rest.
@@ -68,6 +111,20 @@ def _fastest(
         velocity: (n,) limits (rad/s).
         acceleration: (n,) limits (rad/s^2).
     """
+    library = _library()
+    if library is None:
+        return fastest_in_numpy(grid, slopes, bends, velocity, acceleration)
+    x = np.empty(len(grid))
+    arrays = (grid, slopes, bends, velocity, acceleration)
+    limits = (ctypes.c_double(_STILL), ctypes.c_double(_SLOWEST))
+    library.fastest(*slopes.shape, *map(_at, arrays), *limits, _at(x))
+    return x
+
+
+def fastest_in_numpy(
+    grid: Array, slopes: Array, bends: Array, velocity: Array, acceleration: Array
+) -> Array:
+    """The same without a compiler."""
     double = 2 * np.diff(grid)[:, None]
     # The limits of a point hold at its neighbour, too, for the same u.
     a = np.hstack([slopes[:-1], slopes[1:] + double * bends[1:]])
@@ -116,3 +173,14 @@ def _stretch(rows: Array, step: float, velocity: Array, acceleration: Array) -> 
         np.sqrt(np.max(np.abs(changes) / acceleration)),
     )
     return max(1.0, float(excess))
+
+
+@cache
+def _library() -> ctypes.CDLL | None:
+    source = Path(__file__).with_name("timing.c").read_text(encoding="utf-8")
+    return load_compiled("timing", source)
+
+
+def _at(array: Array | None) -> Any:
+    """Where an array begins; it must be contiguous."""
+    return ctypes.c_void_p(None if array is None else array.ctypes.data)
