@@ -8,7 +8,7 @@ INSTALLED := $(VENV)/.installed
 export PATH := $(BIN):$(PATH)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: setup ship quick repro study test lint bench mlflow verify-determinism verify-interruption verify-load sources
+.PHONY: setup ship quick repro study cases test lint bench mlflow verify-determinism verify-interruption verify-load sources
 
 setup: $(INSTALLED)
 
@@ -46,6 +46,13 @@ quick: setup
 # report shows the spread but cannot depend on it, or `dvc repro` would run the studies.
 study: setup
 	dvc repro studies/dvc.yaml
+	dvc repro -f -s render_reports
+	python -m guided_lgp.report.pages
+
+# Families of problems where geometry decides, with policies of their own: about an hour. The report
+# shows their results without depending on them.
+cases: setup
+	dvc repro cases/dvc.yaml
 	dvc repro -f -s render_reports
 	python -m guided_lgp.report.pages
 

@@ -31,6 +31,14 @@ STUDIES = {
 }
 """The stages of the studies and the modules that run them."""
 
+CASES = {
+    "demonstrate": "guided_lgp.cases.demonstrate",
+    "train_case": "guided_lgp.cases.train",
+    "evaluate_case": "guided_lgp.cases.evaluate",
+    "collect_cases": "guided_lgp.cases.collect",
+}
+"""Those of the cases."""
+
 
 def pipeline() -> dict[str, Any]:
     document: dict[str, Any] = yaml.safe_load((ROOT / "dvc.yaml").read_text())
@@ -53,6 +61,21 @@ def test_the_studies_depend_on_their_script_and_their_sources() -> None:
         assert "studies/run.py" in deps
         missing = missing_sources(module, deps)
         assert not missing, f"{stage}: {missing}"
+
+
+def test_the_cases_depend_on_their_sources_and_are_those_of_the_parameters() -> None:
+    stages = yaml.safe_load((ROOT / "cases" / "dvc.yaml").read_text())["stages"]
+    assert set(stages) == set(CASES)
+    for stage, module in CASES.items():
+        missing = missing_sources(module, stages[stage].get("do", stages[stage])["deps"])
+        assert not missing, f"{stage}: {missing}"
+    names = list(PARAMS.cases)
+    assert stages["demonstrate"]["foreach"] == names
+    for stage in ("train_case", "evaluate_case"):
+        assert stages[stage]["matrix"]["case"] == names
+    for case in PARAMS.cases.values():
+        assert tuple(stages["train_case"]["matrix"]["seed"]) == case.seeds
+        assert tuple(stages["evaluate_case"]["matrix"]["training"]) == ("rivals", *case.seeds)
 
 
 @cache
@@ -96,7 +119,7 @@ def test_every_dependency_exists_or_is_made_by_a_stage() -> None:
 
 
 def test_stages_read_declared_parameters_only() -> None:
-    sections = {name for name in Params.model_fields if name not in ("parallel", "bounds")}
+    sections = {name for name in Params.model_fields if name not in ("parallel", "bounds", "cases")}
     assert sections < set(pipeline()["stages"])
     assert list(STAGES) == list(pipeline()["stages"])
 

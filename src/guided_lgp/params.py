@@ -174,8 +174,50 @@ class PlanningParams(Section):
     compare_scalability: SearchLimits
 
 
+class Demonstrations(Section):
+    """The training set of a case."""
+
+    size: Annotated[int, Field(strict=True, ge=1, le=15)]
+    """Boxes per scene."""
+    scenes: Annotated[int, Field(strict=True, ge=2, le=100_000)]
+    seed: Seed
+
+
+class Evaluation(Section):
+    """The test set of a case."""
+
+    sizes: Annotated[
+        tuple[Annotated[int, Field(strict=True, ge=1, le=15)], ...], Field(min_length=1)
+    ]
+    """Boxes per scene."""
+    scenes: Annotated[int, Field(strict=True, ge=1, le=10_000)]
+    """For each size."""
+    seed: Seed
+    paths: Annotated[int, Field(strict=True, ge=0, le=10_000)]
+    """Plans per size and planner of the first training that get a path and are carried out."""
+
+
+class Case(Section):
+    """A family of problems where geometry decides: policies of its own, and its rivals."""
+
+    title: str
+    domain: str
+    robot: str
+    family: str
+    layout: dict[str, Any] = {}
+    """What differs from the family's usual numbers."""
+    demonstrations: Demonstrations
+    training: TrainRelational
+    seeds: Annotated[tuple[Seed, ...], Field(min_length=1)]
+    """One training each."""
+    controls: tuple[str, ...] = ()
+    """Further policies, with less to see or with shuffled labels, each trained as often."""
+    evaluation: Evaluation
+    limits: SearchLimits
+
+
 class Params(PlanningParams):
-    """All parameters; top keys are stage names."""
+    """All parameters; top keys are stage names, but for ``cases``."""
 
     parallel: Parallel
     generate_scenes: GenerateScenes
@@ -185,6 +227,7 @@ class Params(PlanningParams):
     train_improved: TrainPolicy
     train_relational: TrainRelational
     evaluate_generalization: SearchLimits
+    cases: dict[str, Case] = {}
 
 
 def load_params(path: Path = PARAMS) -> Params:

@@ -1,10 +1,20 @@
 """Searches that know, or learn, what blocks what."""
 
+from dataclasses import replace
+
 import pytest
-from scripted import COLOURS, UNIFORM, ScriptedBounds, make_scene
+from scripted import COLOURS, UNIFORM, Scorer, ScriptedBounds, make_scene
 
 from guided_lgp.bounds.results import CoarseResult
-from guided_lgp.logic import Skeleton, parse_objective, parse_skeleton, progress
+from guided_lgp.logic import (
+    Action,
+    Objective,
+    Skeleton,
+    State,
+    parse_objective,
+    parse_skeleton,
+    progress,
+)
 from guided_lgp.params import SearchLimits
 from guided_lgp.scene.model import Scene
 from guided_lgp.search.conflicts import Conflict, Conflicts
@@ -61,6 +71,23 @@ def test_knowledge_saves_calls(problem: Problem, name: str) -> None:
     assert informed.coarse_calls < ignorant.coarse_calls
     assert informed.coarse_calls - informed.part_calls < ignorant.coarse_calls / 2
     assert informed.infeasible_calls < informed.coarse_calls
+
+
+def test_a_policy_that_knows_what_is_in_the_way_needs_no_facts(problem: Problem) -> None:
+    """It makes way first; an estimate by the goals alone takes that for a detour."""
+    order = ["blue", "green", "red"]
+
+    def score(objective: Objective, state: State, action: Action) -> float:
+        away = [box for box in order if state.support_of(box) == "tab2"]
+        box = action.symbols[1]
+        wanted = box == order[len(away)] if len(away) < 3 else False
+        return 5.0 * (wanted and action.symbols[2:] in ((), ("tab2",)))
+
+    guided = replace(problem, policy=Scorer(score))
+    by_policy = SEARCHES["discrepancy"].plan(guided)
+    assert by_policy.skeleton is not None
+    assert by_policy.coarse_calls == len(by_policy.skeleton) == 6
+    assert SEARCHES["best-first"].plan(guided).coarse_calls > 6
 
 
 def test_facts_find_plans_as_short_as_astar(problem: Problem) -> None:

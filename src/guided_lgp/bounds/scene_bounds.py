@@ -46,7 +46,7 @@ class SceneBounds:
         self._path_solutions = params.path_solutions
         self._deadline = deadline
         self._parts = Parts(scene, _PATIENCE * params.coarse_tries, self.facts, deadline)
-        self._pairs = Pairs(scene, self.coarse, self.part)
+        self._pairs = Pairs(scene, self._coarse_bound.solve, self._parts.solve)
         self._coarse: dict[Skeleton, CoarseResult] = {}
         self._path: dict[Skeleton, PathResult] = {}
 

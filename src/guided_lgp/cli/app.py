@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from guided_lgp import __version__
-from guided_lgp.cli import checks, dashboard, files, plan, stages
+from guided_lgp.cli import cases, checks, dashboard, files, plan, stages
 from guided_lgp.cli.running import run_program
 
 app = typer.Typer(
@@ -21,10 +21,13 @@ app = typer.Typer(
 )
 PIPELINE = "The paper's pipeline"
 """The panel of the help that keeps its stages apart."""
-for group in (plan, files, checks, stages):
+CASES = "Cases beside it"
+"""That of the families where geometry decides."""
+for group in (plan, files, checks, stages, cases):
     app.add_typer(group.app)
-for stage in stages.app.registered_commands:
-    stage.rich_help_panel = PIPELINE
+for module, panel in ((stages, PIPELINE), (cases, CASES)):
+    for stage in module.app.registered_commands:
+        stage.rich_help_panel = panel
 app.add_typer(dashboard.app, name="mlflow", rich_help_panel=PIPELINE)
 
 

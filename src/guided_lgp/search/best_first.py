@@ -35,6 +35,11 @@ def plan_with_facts(problem: Problem) -> SearchResult:
     return search(tree, FactsEstimate(problem, facts), facts)
 
 
+def plan_knowing(problem: Problem, facts: Knowledge) -> SearchResult:
+    """The same with facts that are there already."""
+    return search(SkeletonTree(problem), FactsEstimate(problem, facts), facts)
+
+
 def plan_tuned(problem: Problem) -> SearchResult:
     """Best-first by a hand-made count of the actions that facts demand."""
     tree = SkeletonTree(problem)
@@ -47,6 +52,16 @@ def plan_with_conflicts(problem: Problem) -> SearchResult:
     tree = SkeletonTree(problem)
     conflicts = Conflicts(problem.scene, tree.run)
     return search(tree, TunedEstimate(problem, conflicts), conflicts)
+
+
+def plan_by_discrepancy(problem: Problem) -> SearchResult:
+    """Guided LGP, best-first, by the policy alone: what it thinks most probable is no detour.
+
+    What is proved to be out of an arm's reach is not tried.
+    """
+    tree = SkeletonTree(problem)
+    reach = FactsOfPairs(problem, tree.run)
+    return search(tree, PolicyEstimate(problem, detour=0.0), reach)
 
 
 def plan_informed(problem: Problem) -> SearchResult:

@@ -57,13 +57,14 @@ class Estimate(Protocol):
 class PolicyEstimate(Estimate):
     """The policy as a heuristic.
 
-    A node costs its discrepancy, :data:`DETOUR` per action, made or still missing at least, and
+    A node costs its discrepancy, a detour's cost per action, made or still missing at least, and
     :data:`REVISIT`. Equal costs: deeper first.
     """
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, detour: float = DETOUR) -> None:
         self._problem = problem
         self._objective, self._symbols = problem.objective, problem.symbols
+        self._detour = detour
         self._visits: Counter[State] = Counter()
 
     def rank(self, node: Node) -> Rank:
@@ -71,7 +72,7 @@ class PolicyEstimate(Estimate):
         depth = len(node.skeleton)
         length = depth + self._needed(node)
         length += _MOVE * len(self._problem.unsettled(node.skeleton))
-        cost = -node.discrepancy + DETOUR * length + REVISIT * self._visits[node.state]
+        cost = -node.discrepancy + self._detour * length + REVISIT * self._visits[node.state]
         return cost, -depth
 
     def _needed(self, node: Node) -> float:

@@ -10,6 +10,7 @@ from typing import Protocol
 
 from guided_lgp.bounds.coarse.pairs import Pairs
 from guided_lgp.bounds.coarse.parts import Boxes
+from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.logic import (
     Action,
     Goal,
@@ -72,8 +73,8 @@ class FactsOfPairs:
     Those are asked for that estimates want; others would cost more calls than they save.
     """
 
-    def __init__(self, problem: Problem, run: Run) -> None:
-        self._pairs = Pairs(problem.scene, run.coarse, run.part)
+    def __init__(self, problem: Problem, asked: Run | SceneBounds) -> None:
+        self._pairs = Pairs(problem.scene, asked.coarse, asked.part)
         self._out_of_reach = problem.parts.out_of_reach
         self._asked: set[Action] = set()
 

@@ -55,6 +55,11 @@ SEARCHES: Mapping[str, Search] = {
     "conflicts": Search(
         "best_first:plan_with_conflicts", "without a policy, learning from what is infeasible"
     ),
+    "discrepancy": Search(
+        "best_first:plan_by_discrepancy",
+        "best-first by the policy alone, for one that knows the geometry",
+        follows_policy=True,
+    ),
     "informed": Search(
         "best_first:plan_informed", "best-first, with facts of the geometry", follows_policy=True
     ),
@@ -98,6 +103,8 @@ class Planner:
     """Whether figures have a curve of it; tables have all."""
     headline: bool = False
     """Whether the README has one."""
+    carried_out: bool = False
+    """Whether, in a case of its own, its plans get paths and are carried out."""
     color: str | None = None
     """If it is not that of its policy."""
     marker: str = "D"
@@ -207,6 +214,42 @@ PLANNERS: Mapping[str, Planner] = {
     )
 }
 """Every planner that the experiments compare, in the order of the tables and legends."""
+
+CASE_PLANNERS: Mapping[str, Planner] = {
+    planner.name: planner
+    for planner in (
+        Planner(name="no_policy", label="No policy", search="best-first", policy=UNIFORM),
+        Planner(name="astar", label="A*", search="astar"),
+        Planner(name="facts", label="A*, facts", search="facts"),
+        Planner(name="facts_tuned", label="Facts, tuned", search="facts-tuned"),
+        Planner(name="conflicts", label="Conflicts", search="conflicts"),
+        Planner(
+            name="relational", label="Relational", search="guided", policy="full", carried_out=True
+        ),
+        Planner(
+            name="relational_best_first",
+            label="Relational best-first",
+            search="discrepancy",
+            policy="full",
+            carried_out=True,
+        ),
+        Planner(
+            name="relational_informed",
+            label="Relational, informed",
+            search="informed",
+            policy="full",
+        ),
+        *(
+            Planner(name=f"relational_{name}", label=label, search="guided", policy=name)
+            for name, label in (
+                ("no_relative_geometry", "Relational without relative geometry"),
+                ("no_sizes", "Relational without sizes"),
+                ("shuffled", "Relational, shuffled labels"),
+            )
+        ),
+    )
+}
+"""The planners of the cases; their policies are those of a case: the full one and its controls."""
 
 TABLE_3 = {name: planner for name, planner in PLANNERS.items() if planner.table_3}
 """Planners of the comparison of scalability, in the order of every table and legend."""

@@ -23,8 +23,6 @@ Length = Annotated[float, Field(gt=0, le=1)]
 COLOURS = ("red", "green", "blue", "yellow", "purple", "orange", "white")
 """Names of the boxes; which is which says nothing about heights."""
 GOAL_TABLE = "tab2"
-_LONG = 5
-"""Up to so many boxes the usual tables are long enough."""
 
 
 class Rows(Layout):
@@ -33,7 +31,7 @@ class Rows(Layout):
     box: tuple[Length, Length] = (0.12, 0.06)
     """Length, towards the robot, and width of every box."""
     heights: tuple[Length, ...] = (0.05, 0.08, 0.11, 0.14)
-    gap: tuple[Length, Length] = (0.015, 0.045)
+    gap: tuple[Length, Length] = (0.012, 0.03)
     """Between neighbours: from, to."""
     wide_gap: tuple[Length, Length] = (0.062, 0.08)
     """Where fingers fit in any case ..."""
@@ -41,37 +39,37 @@ class Rows(Layout):
     """... and how often that is so."""
     x: float = 0.52
     """Where the row is before the robot ..."""
-    jitter: Annotated[float, Field(ge=0, le=0.1)] = 0.015
-    """... and by how much a box may be off."""
+    jitter: Annotated[float, Field(ge=0, le=0.1)] = 0.003
+    """... and by how much a box may be off: one that juts out can be taken at its end."""
     blocking_gap: Length = 0.05
     """Up to this distance a neighbour may be in the way of the fingers ..."""
     blocking_height: Length = 0.02
     """... unless it is lower than the box by more than this: as deep as fingers reach."""
 
 
-def tables(size: int) -> tuple[Table, Table]:
-    """The table with the row, at the left, and the other one; longer for many boxes."""
-    half = 0.24 if size <= _LONG else 0.32
-    return (
-        Table(name="tab1", position=(0.54, 0.04 + half, 0.60), half_extents=(0.17, half)),
-        Table(name=GOAL_TABLE, position=(0.54, -0.04 - half, 0.60), half_extents=(0.17, half)),
-    )
+TABLES = (
+    Table(name="tab1", position=(0.54, 0.36, 0.60), half_extents=(0.17, 0.32)),
+    Table(name=GOAL_TABLE, position=(0.54, -0.36, 0.60), half_extents=(0.17, 0.32)),
+)
+"""The table with the row, at the left, and the other one; seven boxes fit."""
 
 
 def draw(layout: Rows, size: int, name: str, rng: np.random.Generator) -> Drawn:
     """One row, on the table at the left."""
     places = row(layout, layout.x, rng.choice(layout.heights, size), rng)
-    return problem(layout, name, tables(size), places, rng)
+    return problem(layout, name, places, rng)
 
 
 def row(layout: Rows, x: float, heights: Array, rng: np.random.Generator) -> Array:
-    """Places (n, 3) of boxes in a row along y: x, y from the middle of the row, and height."""
+    """Places (n, 3) of boxes in a row along y, anywhere on the table: x, y and height."""
     if not len(heights):
         return np.zeros((0, 3))
     gaps = [_gap(layout, one, other, rng) for one, other in pairwise(heights)]
     ys = np.concatenate([[0.0], np.cumsum(np.array(gaps) + layout.box[1])])
     xs = x + rng.uniform(-layout.jitter, layout.jitter, len(heights))
-    return np.column_stack([xs, ys - (ys[0] + ys[-1]) / 2, heights])
+    room = max(0.0, TABLES[0].half_extents[1] - (ys[-1] + layout.box[1]) / 2)
+    middle = TABLES[0].position[1] + rng.uniform(-room, room)
+    return np.column_stack([xs, ys - ys[-1] / 2 + middle, heights])
 
 
 def _gap(layout: Rows, one: float, other: float, rng: np.random.Generator) -> float:
@@ -84,7 +82,6 @@ def _gap(layout: Rows, one: float, other: float, rng: np.random.Generator) -> fl
 def problem(
     layout: Rows,
     name: str,
-    on: tuple[Table, Table],
     places: Array,
     rng: np.random.Generator,
 ) -> Drawn:
@@ -93,27 +90,26 @@ def problem(
     Args:
         layout: the family's numbers.
         name: of the scene.
-        on: the two tables.
-        places: (n, 3) x, y from the middle of the table, and height of each box.
+        places: (n, 3) x, y (m) and height of each box.
         rng: random numbers.
     """
     names = rng.permutation(COLOURS[: len(places)])
     boxes = sorted(
         (
-            _box(layout, str(box), on[0], *map(float, place))
+            _box(layout, str(box), *map(float, place))
             for box, place in zip(names, places, strict=True)
         ),
         key=lambda box: COLOURS.index(box.name),
     )
-    scene = Scene(name=name, tables=on, boxes=tuple(boxes))
+    scene = Scene(name=name, tables=TABLES, boxes=tuple(boxes))
     ways = {box.name: len(chain(layout, scene, box.name)) for box in boxes}
     target = rng.choice([name for name, way in ways.items() if way == max(ways.values())])
     return Drawn(scene, (_to_other_table(str(target)),))
 
 
-def _box(layout: Rows, name: str, table: Table, x: float, y: float, height: float) -> Box:
-    _, middle, top = table.position
-    position = (round(x, 6), round(middle + y, 6), round(top + height / 2, 6))
+def _box(layout: Rows, name: str, x: float, y: float, height: float) -> Box:
+    table = TABLES[0]
+    position = (round(x, 6), round(y, 6), round(table.position[2] + height / 2, 6))
     return Box(name=name, size=(*layout.box, round(height, 6)), position=position, on=table.name)
 
 
@@ -121,7 +117,7 @@ def blockers(layout: Rows, scene: Scene, box: Box) -> Iterator[Box]:
     """What stands beside a box, near and tall enough to be in the way of fingers."""
     for other in scene.boxes:
         beside = abs(other.position[0] - box.position[0]) < layout.box[0]
-        near = gap(footprint(box), footprint(other)) <= layout.blocking_gap
+        near = abs(other.position[1] - box.position[1]) - layout.box[1] <= layout.blocking_gap
         if (
             other != box
             and beside

@@ -19,7 +19,6 @@ class Decoys(rows.Rows):
     """Of the row in front ..."""
     behind: rows.Length = 0.14
     """... and how far the other one is behind it."""
-    jitter: float = 0.005
 
 
 def draw(layout: Decoys, size: int, name: str, rng: np.random.Generator) -> Drawn:
@@ -32,7 +31,7 @@ def draw(layout: Decoys, size: int, name: str, rng: np.random.Generator) -> Draw
             rows.row(layout, layout.x + layout.behind, heights[front:], rng),
         ]
     )
-    return rows.problem(layout, name, rows.tables(size), places, rng)
+    return rows.problem(layout, name, places, rng)
 
 
 def tallest_stays(layout: Decoys, drawn: Drawn) -> bool:

@@ -1,0 +1,109 @@
+"""The figures of all cases: ``reports/cases.json``, and times in a file of their own."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from statistics import fmean
+from typing import Any
+
+from guided_lgp.cases.policies import RIVALS
+from guided_lgp.documents import read_json, write_json
+from guided_lgp.params import Case, Params
+from guided_lgp.paths import REPORTS
+
+RESULTS = REPORTS / "cases.json"
+TIMES = REPORTS / "cases_timing.json"
+Row = dict[str, Any]
+Figures = dict[str, dict[str, dict[str, Row]]]
+"""By case, size and planner."""
+
+
+def run(params: Params, root: Path) -> None:
+    """Write ``reports/cases.json`` and ``reports/cases_timing.json``."""
+    rows = {name: read_rows(root, name, case) for name, case in params.cases.items()}
+    write_json(root / RESULTS, by_cell(rows, figures))
+    write_json(root / TIMES, by_cell(rows, times))
+
+
+def read_rows(root: Path, name: str, case: Case) -> list[Row]:
+    """One row per problem, planner and training, times included.
+
+    Raises:
+        InputError: an evaluation is missing; the message names the command.
+    """
+    found = []
+    for training in (RIVALS, *map(str, case.seeds)):
+        remedy = f"the output of evaluate_case --case {name} --training {training}"
+        folder = root / REPORTS / name
+        rows = read_json(folder / f"{training}.json", remedy)
+        seconds = read_json(folder / "times" / f"{training}.json", remedy)
+        found += [
+            {**row, "training": training, "time_s": time["time_s"]}
+            for row, time in zip(rows, seconds, strict=True)
+        ]
+    return found
+
+
+def by_cell(rows: Mapping[str, Sequence[Row]], summary: Callable[[list[Row]], Row]) -> Figures:
+    """Summaries by case, size and planner, in the order of the rows."""
+    cells: dict[str, dict[str, dict[str, list[Row]]]] = {}
+    for name, found in rows.items():
+        for row in found:
+            sizes = cells.setdefault(name, {}).setdefault(str(row["size"]), {})
+            sizes.setdefault(row["planner"], []).append(row)
+    return {
+        name: {
+            size: {planner: summary(cell) for planner, cell in planners.items()}
+            for size, planners in sizes.items()
+        }
+        for name, sizes in cells.items()
+    }
+
+
+def figures(cell: list[Row]) -> Row:
+    """What one planner did on the problems of one size.
+
+    ``problems`` is scenes times trainings, ``solved_min`` the number of the worst training. Means
+    of calls are over the solved; ``calls_limited_mean`` is over all, with the limit for the others.
+    """
+    trainings: dict[str, list[Row]] = {}
+    for row in cell:
+        trainings.setdefault(row["training"], []).append(row)
+    solved = [row for row in cell if row["solved"]]
+    return {
+        "scenes": len({row["scene"] for row in cell}),
+        "trainings": len(trainings),
+        "problems": len(cell),
+        "solved": len(solved),
+        "solved_min": min(sum(row["solved"] for row in rows) for rows in trainings.values()),
+        "calls_mean": _mean(row["coarse_calls"] for row in solved),
+        "infeasible_calls_mean": _mean(row["infeasible_calls"] for row in solved),
+        "part_calls_mean": _mean(row["part_calls"] for row in solved),
+        "calls_limited_mean": _mean(map(limited, cell)),
+        "failed_candidates_mean": _mean(row["failed_candidates"] for row in solved),
+        "plan_length_mean": _mean(row["length"] for row in solved),
+        "path_verified_share": _share(row["path_verified"] for row in cell),
+        "physics_share": _share(row["physics"] for row in cell),
+    }
+
+
+def times(cell: list[Row]) -> Row:
+    """Seconds of the searches that found a plan."""
+    return {"time_mean_s": _mean(row["time_s"] for row in cell if row["solved"])}
+
+
+LIMIT = 100
+"""What a search that found nothing counts as, in calls: the limit of all of them."""
+
+
+def limited(row: Row) -> int:
+    """The calls of a search; the limit where it found no plan."""
+    return int(row["coarse_calls"]) if row["solved"] else LIMIT
+
+
+def _mean(values: Iterable[float]) -> float | None:
+    found = list(values)
+    return round(fmean(found), 4) if found else None
+
+
+def _share(values: Iterable[Any]) -> float | None:
+    return _mean(float(value) for value in values if value is not None)

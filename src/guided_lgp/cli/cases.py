@@ -1,0 +1,92 @@
+"""The stages of the cases: families of problems where geometry decides."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from guided_lgp.cli.alone import alone
+from guided_lgp.cli.stages import end_with_dvc
+from guided_lgp.cli.terminal import ParamsFile
+from guided_lgp.paths import PARAMS
+
+if TYPE_CHECKING:
+    from guided_lgp.params import Params
+
+app = typer.Typer()
+
+CaseName = Annotated[str, typer.Option("--case", help="A case of params.yaml.")]
+
+
+@app.command("demonstrate")
+def demonstrate(case: CaseName, params: ParamsFile = PARAMS) -> None:
+    """Find demonstrations of a case by search. Writes data/CASE.
+
+    Example: guided-lgp demonstrate --case rows
+    """
+    from guided_lgp.cases import demonstrate
+
+    _run("demonstrate", case, lambda root, read: demonstrate.run(read, root, case), params)
+
+
+@app.command("train_case")
+def train_case(
+    case: CaseName,
+    seed: Annotated[int, typer.Option(help="Of the training.")],
+    params: ParamsFile = PARAMS,
+) -> None:
+    """Train the policies of a case once. Writes models/CASE.
+
+    Example: guided-lgp train_case --case rows --seed 1
+    """
+    from guided_lgp.cases import train
+
+    _run(f"train_case@{seed}", case, lambda root, read: train.run(read, root, case, seed), params)
+
+
+@app.command("evaluate_case")
+def evaluate_case(
+    case: CaseName,
+    training: Annotated[str, typer.Option(help="Seed of one, or: rivals.")],
+    params: ParamsFile = PARAMS,
+) -> None:
+    """Plan the test problems of a case. Writes reports/CASE.
+
+    Example: guided-lgp evaluate_case --case rows --training rivals
+    """
+    from guided_lgp.cases import evaluate
+
+    _run(
+        f"evaluate_case@{training}",
+        case,
+        lambda root, read: evaluate.run(read, root, case, training),
+        params,
+    )
+
+
+@app.command("collect_cases")
+def collect_cases(params: ParamsFile = PARAMS) -> None:
+    """Put the figures of all cases together. Writes reports/cases.json.
+
+    Example: guided-lgp collect_cases
+    """
+    from guided_lgp.cases import collect
+    from guided_lgp.params import load_params
+
+    end_with_dvc()
+    collect.run(load_params(params), Path.cwd())
+
+
+def _run(stage: str, case: str, work: "Callable[[Path, Params], None]", params_file: Path) -> None:
+    """Check the parameters and the case, then run a stage, and record it."""
+    from guided_lgp import tracking
+    from guided_lgp.cases.declared import declared_case
+    from guided_lgp.params import load_params
+
+    end_with_dvc()
+    params, root = load_params(params_file), Path.cwd()
+    declared_case(params, case)
+    address = f"{stage}-{case}"
+    with alone(root, address), tracking.recorded(address, params):
+        work(root, params)

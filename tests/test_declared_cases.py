@@ -1,0 +1,159 @@
+"""Cases: refused before anything is computed, no scene twice, labels that are true, figures."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from guided_lgp.cases import collect, demonstrate, train
+from guided_lgp.cases.declared import declared_case
+from guided_lgp.cases.policies import FULL, SHUFFLED, SIGHTS, models_of
+from guided_lgp.cases.shards import run_kept
+from guided_lgp.domains import load_domain
+from guided_lgp.errors import InputError
+from guided_lgp.logic import applicable_actions
+from guided_lgp.params import Parallel, Params, load_params
+from guided_lgp.policy.relational.inference import load_relational
+from guided_lgp.policy.relational.samples import Examples
+
+ROOT = Path(__file__).parents[1]
+PARAMS = load_params(ROOT / "params.yaml")
+
+
+def changed(case: str = "rows", **update: Any) -> Params:
+    cases = dict(PARAMS.cases)
+    cases[case] = cases[case].model_copy(update=update)
+    return PARAMS.model_copy(update={"cases": cases})
+
+
+@pytest.mark.parametrize(
+    ("update", "fault"),
+    [
+        ({"domain": "chess"}, r"cases\.rows\.domain: unknown domain 'chess' .*pick_and_place"),
+        ({"robot": "nao"}, r"'nao' .*pr2"),
+        ({"family": "heaps"}, r"cases\.rows\.family: unknown family 'heaps' .*rows"),
+        ({"layout": {"gap": 3}}, r"cases\.rows\.layout: gap"),
+        ({"layout": {"slope": 3}}, r"cases\.rows\.layout: slope"),
+        ({"controls": ("blindfold",)}, r"cases\.rows\.controls: unknown 'blindfold' .*shuffled"),
+    ],
+)
+def test_a_case_that_names_what_there_is_not_is_refused(update: dict[str, Any], fault: str) -> None:
+    with pytest.raises(InputError, match=fault):
+        declared_case(changed(**update), "rows")
+
+
+def test_an_unknown_case_is_refused() -> None:
+    with pytest.raises(InputError, match=r"unknown case 'column' .*rows, rows_decoys"):
+        declared_case(PARAMS, "column")
+
+
+@pytest.mark.parametrize("name", PARAMS.cases)
+def test_no_problem_of_a_test_set_is_in_a_training_set(name: str) -> None:
+    """Neither a scene nor a row of it: sizes, seeds and positions all differ."""
+    case = declared_case(PARAMS, name)
+    trained, tested = case.params.demonstrations, case.params.evaluation
+    assert trained.size not in tested.sizes
+    assert trained.seed != tested.seed
+
+    def places(scene: Any) -> set[tuple[float, ...]]:
+        return {(*box.position, *box.size) for box in scene.boxes}
+
+    known = set().union(*(places(scene) for scene, _ in case.training()))
+    for size in tested.sizes:
+        problems = case.problems(size)
+        assert len(problems) == tested.scenes
+        assert len({drawn.scene.name for drawn in problems}) == tested.scenes
+        assert known.isdisjoint(set().union(*(places(drawn.scene) for drawn in problems)))
+
+
+@pytest.fixture(scope="module")
+def rows() -> list[dict[str, Any]]:
+    """The labelled states of one scene with one goal."""
+    case = declared_case(PARAMS, "rows")
+    task = next(demonstrate._tasks(case, PARAMS))
+    return demonstrate.demonstrate(replace(task, objectives=task.objectives[:1]))
+
+
+def test_labels_are_disjoint_and_applicable(rows: list[dict[str, Any]]) -> None:
+    case = declared_case(PARAMS, "rows")
+    scene, _ = next(case.training())
+    start = {
+        tuple(demonstrate._place(scene, action))
+        for action in applicable_actions(scene.state, scene.symbols)
+    }
+    assert rows
+    for row in rows:
+        right, wrong = (set(map(tuple, row[name])) for name in ("right", "wrong"))
+        assert right
+        assert not right & wrong
+    assert {tuple(place) for name in ("right", "wrong") for place in rows[0][name]} <= start
+
+
+def test_a_policy_of_each_kind_is_trained(rows: list[dict[str, Any]], tmp_path: Path) -> None:
+    arrays = demonstrate._arrays([row | {"configuration": i % 3} for i, row in enumerate(rows * 3)])
+    file = tmp_path / "data" / "rows" / "demonstrations.safetensors"
+    demonstrate.write_tensors(file, arrays)
+    quick = PARAMS.cases["rows"].training.model_copy(update={"epochs": 1, "width": 8})
+    params = changed(training=quick, seeds=(7,)).model_copy(
+        update={"parallel": Parallel(backend="loky", workers=1)}
+    )
+    train.run(params, tmp_path, "rows", 7)
+    for policy in (FULL, *params.cases["rows"].controls):
+        loaded = load_relational(models_of(tmp_path, "rows", policy, 7))
+        assert loaded._weights.sight == SIGHTS[policy]
+    examples = train.load_demonstrations(tmp_path, "rows", load_domain())
+    assert isinstance(examples, Examples)
+    labels = train.shuffled(examples, np.random.default_rng(1)).right
+    assert labels.sum(axis=(1, 2)).tolist() == [1] * len(examples)
+    assert (labels != examples.right).any()
+    assert SHUFFLED in params.cases["rows"].controls
+
+
+def double(number: int) -> int:
+    return 2 * number
+
+
+def test_results_are_kept_and_damaged_ones_made_again(tmp_path: Path) -> None:
+    settings = Parallel(backend="loky", workers=1)
+    tasks = [(number, number) for number in range(3)]
+    assert run_kept(double, tasks, tmp_path, settings, "doubling") == [0, 2, 4]
+    files = sorted(tmp_path.iterdir())
+    kept = {file: file.stat().st_mtime_ns for file in files}
+    files[0].write_text("{")
+    assert run_kept(double, tasks[:2], tmp_path, settings, "doubling") == [0, 2]
+    left = sorted(tmp_path.iterdir())
+    assert len(left) == 2
+    assert all(file.stat().st_mtime_ns == kept[file] for file in left if file != files[0])
+
+
+def row(training: str, solved: bool, calls: int, **more: Any) -> dict[str, Any]:
+    base = {"scene": "one", "size": 4, "planner": "facts", "length": 4 if solved else None}
+    counts = {"coarse_calls": calls, "infeasible_calls": 1, "part_calls": 0, "failed_candidates": 0}
+    checks = {"path_verified": None, "physics": None, "time_s": 0.5}
+    return base | counts | checks | {"training": training, "solved": solved} | more
+
+
+def test_figures() -> None:
+    cell = [
+        row("1", True, 4, path_verified=True, physics=True),
+        row("1", True, 8, scene="two", path_verified=False),
+        row("2", True, 6),
+        row("2", False, 100, scene="two"),
+    ]
+    assert collect.figures(cell) == {
+        "scenes": 2,
+        "trainings": 2,
+        "problems": 4,
+        "solved": 3,
+        "solved_min": 1,
+        "calls_mean": 6.0,
+        "infeasible_calls_mean": 1.0,
+        "part_calls_mean": 0.0,
+        "calls_limited_mean": 29.5,
+        "failed_candidates_mean": 0.0,
+        "plan_length_mean": 4.0,
+        "path_verified_share": 0.5,
+        "physics_share": 1.0,
+    }
