@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import (
@@ -145,7 +145,7 @@ class PlacedRobot(BaseModel):
         return data | {name: data.get(name, value) for name, value in defaults.items()}
 
     @model_validator(mode="after")
-    def _known_joints(self) -> Self:
+    def _known_joints(self) -> "PlacedRobot":
         for joint in self.joints:
             if joint not in self.description.joint_names:
                 near = ", ".join(get_close_matches(joint, self.description.joint_names, 3, 0.0))
@@ -153,7 +153,7 @@ class PlacedRobot(BaseModel):
         return self
 
     @model_validator(mode="after")
-    def _mirror_images(self) -> Self:
+    def _mirror_images(self) -> "PlacedRobot":
         mirrored = any(arm.mirror_of for arm in self.description.arms.values())
         if mirrored and abs(math.sin(self.tilt[0])) > _LEVEL:
             raise ValueError("tilt: a robot whose arms are mirror images can pitch, not roll")
