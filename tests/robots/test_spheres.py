@@ -1,6 +1,7 @@
 """Hulls and the spheres around them, against PyBullet and by random points."""
 
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pybullet
@@ -8,7 +9,7 @@ import pytest
 from descriptions import ARMS, ArmDescription
 
 from guided_lgp.robots.measures.hulls import between, link_hulls
-from guided_lgp.robots.measures.spheres import covering_spheres
+from guided_lgp.robots.measures.spheres import covering_spheres, kept_spheres
 
 _ROBOTS = {name: ARMS[name] for name in ("pr2, left", "panda", "ur5", "baxter", "tiago")}
 
@@ -25,6 +26,20 @@ def test_spheres_contain_every_point_of_the_hull(arm: ArmDescription) -> None:
         assert distance.min(axis=1).max() < 1e-9
         around = np.linalg.norm(vertices - vertices.mean(axis=0), axis=1).max()
         assert spheres.radii.max() <= 1.01 * around
+
+
+def test_spheres_are_kept_to_the_last_bit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    shapes = [np.random.default_rng(seed).normal(size=(20, 3)) for seed in range(3)]
+    made, kept = kept_spheres(shapes), kept_spheres(shapes)
+    for shape, first, again in zip(shapes, made, kept, strict=True):
+        expected = covering_spheres(shape)
+        for found in (first, again):
+            np.testing.assert_array_equal(found.centres, expected.centres)
+            np.testing.assert_array_equal(found.radii, expected.radii)
+    assert len(list((tmp_path / "guided-lgp").glob("spheres-*.json"))) == 1
+    kept_spheres(shapes[:2])
+    assert len(list((tmp_path / "guided-lgp").glob("spheres-*.json"))) == 2
 
 
 def test_a_long_link_gets_smaller_spheres_than_one() -> None:

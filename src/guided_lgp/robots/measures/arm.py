@@ -13,7 +13,7 @@ from guided_lgp.robots.chain import Array, Chain, Joint, path_between, read_chai
 from guided_lgp.robots.measures.hand import HandShape, measure_hand
 from guided_lgp.robots.measures.hulls import link_hulls
 from guided_lgp.robots.measures.levers import lever_arms
-from guided_lgp.robots.measures.spheres import covering_spheres
+from guided_lgp.robots.measures.spheres import kept_spheres
 
 _LOAD = 0.15
 """Reach (m) of a held object or of the hand beyond the tool frame's origin, for the metric."""
@@ -101,12 +101,13 @@ class ArmMeasures:
         chain = {joint.child for joint in path}
         frames = self._frames()
         spheres: dict[str, list[tuple[float, float, float, float]]] = {}
-        for link in (*self.links, *self.hand_links):
+        links = (*self.links, *self.hand_links)
+        shapes = [np.concatenate(link_hulls(self.urdf)[link]) for link in links]
+        for link, covering in zip(links, kept_spheres(shapes), strict=True):
             above = link
             while above not in chain:
                 above = joints[above].parent
             place = frames[above].actInv(frames[link])
-            covering = covering_spheres(np.concatenate(link_hulls(self.urdf)[link]))
             centres = covering.centres @ place.rotation.T + place.translation
             rows = np.column_stack([centres, covering.radii]).round(4)
             spheres.setdefault(above, []).extend(tuple(row) for row in rows.tolist())

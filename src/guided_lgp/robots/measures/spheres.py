@@ -1,11 +1,17 @@
 """A few spheres that contain a link, for the coarse bound's distances."""
 
+import json
+from collections.abc import Sequence
 from dataclasses import dataclass
+from hashlib import sha256
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 
+from guided_lgp.cache import made
 from guided_lgp.robots.chain import Array
+from guided_lgp.robots.measures import hulls
 from guided_lgp.robots.measures.hulls import between
 
 _MOST = 3
@@ -23,6 +29,23 @@ class Spheres:
     """(k, 3) m."""
     radii: Array
     """(k,) m."""
+
+
+def kept_spheres(shapes: Sequence[Array]) -> list[Spheres]:
+    """:func:`covering_spheres` of every shape, computed once per content of shapes and program."""
+    program = [Path(file).read_bytes() for file in (__file__, hulls.__file__)]
+    content = sha256(b"".join([*program, *(shape.tobytes() for shape in shapes)])).hexdigest()
+
+    def covered(_: Path) -> bytes:
+        spheres = map(covering_spheres, shapes)
+        return json.dumps([[s.centres.tolist(), s.radii.tolist()] for s in spheres]).encode()
+
+    file = made(f"spheres-{content[:16]}.json", covered)
+    assert file is not None  # a document is always made
+    return [
+        Spheres(np.array(centres), np.array(radii))
+        for centres, radii in json.loads(file.read_text(encoding="utf-8"))
+    ]
 
 
 def covering_spheres(vertices: Array, most: int = _MOST) -> Spheres:
