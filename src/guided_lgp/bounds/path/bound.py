@@ -20,8 +20,9 @@ from guided_lgp.scene.world import world_of
 
 _ITERATIONS = 150
 """Samples of the sampling planner per motion."""
-_QUERIES = 400
-"""Collision queries per action (and for four more) and coarse solution."""
+_QUERIES = 250
+"""Collision queries per action (and for four more) and coarse solution: of 108 found motions, 98 %
+took less than 210, and with less effort a search that fails goes on to the next solution sooner."""
 _VISITS = 8
 """Situations in which an action is begun, counted in the same way."""
 
