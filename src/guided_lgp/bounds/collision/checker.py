@@ -60,7 +60,7 @@ class CollisionChecker:
     """Checks configurations of the robot in one scene; a planning scene says which move."""
 
     def __init__(self, scene: Scene) -> None:
-        robot = scene.robot.description
+        robot = self._robot = scene.robot.description
         self._model = pin.buildModelFromUrdf(str(robot.urdf))
         base = pin.XYZQUATToSE3(scene.robot.base_pose)
         self._geometry = pin.GeometryModel()
@@ -203,17 +203,29 @@ class CollisionChecker:
         if len(rows) > _FEW:
             rows = rows[~self.certified(self.moving_joints(q[rows], fingers))]
         coordinates = self.coordinates(q, fingers)
-        for row in rows:
-            if pin.computeCollisions(
-                self._model, self._data, self._broad, self._callback, coordinates[row]
-            ):
-                pair = self._geometry.collisionPairs[self._callback.collisionPairIndex]
-                return self._names[pair.first], self._names[pair.second]
-        return None
+        found = (self._collision(coordinates[row]) for row in rows)
+        return next(filter(None, found), None)
+
+    def _collision(self, coordinates: Array) -> tuple[str, str] | None:
+        if not pin.computeCollisions(
+            self._model, self._data, self._broad, self._callback, coordinates
+        ):
+            return None
+        pair = self._geometry.collisionPairs[self._callback.collisionPairIndex]
+        return self._names[pair.first], self._names[pair.second]
 
     def certified(self, moving: Array) -> NDArray[np.bool_]:
         """Which rows (m, joints) of all moving joints are surely free; see :class:`Certificate`."""
         return self._certificate.free(moving, self._apart, PADDING)
+
+    def free(self, moving: Array) -> NDArray[np.bool_]:
+        """Which rows (m, joints) of all moving joints are free; coal decides what is not sure."""
+        free = self.certified(moving)
+        for row in np.flatnonzero(~free):
+            fingers = self._robot.finger_values(moving[row])
+            q = moving[row, None, : len(self._robot.joint_names)]
+            free[row] = self._collision(self.coordinates(q, fingers)[0]) is None
+        return free
 
     def moving_joints(self, q: Array, fingers: Mapping[str, float]) -> Array:
         """Rows (m, joints) of all moving joints for configurations (m, n)."""

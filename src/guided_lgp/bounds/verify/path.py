@@ -104,8 +104,8 @@ def _walk(
 class _Collisions:
     """Looks for collisions and counts.
 
-    PyBullet judges every ``JUDGED``-th configuration, those in which fingers move, and those that
-    are not surely free by the bodies' convex hulls with a padding: elsewhere nothing touches.
+    PyBullet judges every ``JUDGED``-th configuration, those in which fingers move, and those in
+    which coal finds the same convex hulls nearer to each other than its padding.
     """
 
     def __init__(self, world: World) -> None:
@@ -143,7 +143,7 @@ class _Collisions:
         self._checker.enter(
             PlanningScene(grippers[0], standing, phase.grips, held, frozenset(grippers[1:]))
         )
-        judged = ~self._checker.certified(phase.q)
+        judged = ~self._checker.free(phase.q)
         judged[::JUDGED] = judged[-1] = True
         fingers = phase.q[:, len(robot.joint_names) :]
         judged[1:] |= np.any(np.diff(fingers, axis=0), axis=1)
