@@ -86,6 +86,17 @@ def test_a_table_out_of_reach_is_named_before_any_search() -> None:
     assert (result.tree_size, result.coarse_calls) == (1, 0)
 
 
+def test_boxes_that_touch_are_named_and_no_residual() -> None:
+    """The reason is what stands in the way, not where a solver's compromise was worst."""
+    result = plan(CASES / "touching_row.json", "(on p2 right)", timeout=300)
+    assert not result.solved
+    assert result.finding is not None
+    assert result.finding.kind == "blocked"
+    assert result.explanation.startswith("the fingers do not fit between p1, p2, p3: ")
+    assert result.finding.help == "space between p1, p2, p3"
+    assert "violated" not in result.explanation
+
+
 def test_a_goal_that_needs_a_hand_over_gets_one() -> None:
     """One arm reaches the box, the other its place: what the paper's instructions cannot do."""
     case = CASES / "handover_only.json"
@@ -94,5 +105,6 @@ def test_a_goal_that_needs_a_hand_over_gets_one() -> None:
     assert [action.instruction for action in result.skeleton] == ["grasp", "take", "place"]
     assert result.scene.domain == "handover"
     refused = plan(case, "(on parcel farright)", domain="pick_and_place", timeout=300)
-    assert not refused.solved
-    assert refused.scene.domain == "pick_and_place"
+    assert refused.finding is not None
+    assert refused.explanation.startswith("parcel can be taken by pr2L, which cannot put it on far")
+    assert "--domain handover (take)" in refused.finding.help

@@ -59,7 +59,7 @@ def test_equal_obstacles_are_counted_and_the_shortest_sequence_is_the_example() 
     )
     assert found.action == Action("grasp", ("pr2R", "red"))
     assert (found.sequences, found.example, found.violation) == (2, (found.action,), 0.02)
-    assert str(found) == ("(grasp pr2R red): action 1: hold pr2R red violated by 0.02 (9 starts)")
+    assert str(found) == "(grasp pr2R red): action 1 has no solution (9 starts)"
 
 
 def test_what_is_nearest_to_the_goals_comes_first() -> None:
@@ -89,32 +89,33 @@ def test_a_sequence_asked_twice_counts_once() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "goals", "nodes", "culprits"),
+    ("name", "goals", "nodes"),
     [
-        ("impossible_tower", ["(on red green)", "(on blue red)"], 400, {"hold", "clear"}),
-        (
-            "impossible_pair",
-            ["(on wide1 small)", "(on wide2 small)"],
-            1000,
-            {"balanced", "beside", "hold"},
-        ),
+        ("impossible_tower", ["(on red green)", "(on blue red)"], 400),
+        ("impossible_pair", ["(on wide1 small)", "(on wide2 small)"], 1000),
     ],
 )
-def test_impossible_tasks_name_the_action_the_constraint_and_the_amount(
-    name: str, goals: list[str], nodes: int, culprits: set[str]
+def test_impossible_tasks_are_explained_by_facts_or_by_an_action(
+    name: str, goals: list[str], nodes: int
 ) -> None:
     scene = load_scene(EXAMPLES / f"{name}.json")
     result = plan(scene, goals, "breadth-first", max_nodes=nodes)
     assert not result.solved
     first = result.obstacles[0]
-    assert first.action.instruction == "place"
-    assert f"(on {' '.join(first.action.symbols[1:])})" in goals
-    assert any(first.constraint.startswith(culprit) for culprit in culprits)
     assert first.violation > 0.001
-    assert str(first) in result.explanation
+    assert "violated" not in result.explanation  # a solver's compromise is no reason
+    told = str(first) if result.finding is None else result.finding.text
+    assert told in result.explanation
     assert f"{result.coarse_calls} sequences with {result.solver_starts} starts" in (
         result.explanation
     )
+
+
+def test_what_only_a_search_can_tell_names_the_action() -> None:
+    (found,) = obstacles(
+        {}, {"(grasp pr2R red)": Failure(0, "no motion found to grasp red", float("nan"), "3 ways")}
+    )
+    assert str(found) == "(grasp pr2R red): action 1: no motion found to grasp red (3 ways)"
 
 
 def test_attempts_that_go_in_circles_are_told_apart_from_infeasible_ones() -> None:

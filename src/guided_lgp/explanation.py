@@ -31,8 +31,11 @@ class Obstacle:
         return self.example[-1]
 
     def __str__(self) -> str:
-        failure = Failure(len(self.example) - 1, self.constraint, self.violation, self.tried)
-        return f"{format_skeleton(self.example)}: {failure}"
+        """What stopped the example; of a solver that found nothing, no more than that."""
+        action = f"{format_skeleton(self.example)}: action {len(self.example)}"
+        if self.bound == "coarse" and not math.isnan(self.violation):
+            return f"{action} has no solution ({self.tried})"
+        return f"{action}: {self.constraint} ({self.tried})"
 
     def document(self) -> dict[str, object]:
         """The JSON document of the obstacle."""

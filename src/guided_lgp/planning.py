@@ -2,12 +2,13 @@
 
 import logging
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-from guided_lgp.bounds.deadline import Deadline
+from guided_lgp.bounds.deadline import Deadline, OutOfTimeError
 from guided_lgp.bounds.goals import GoalTerms
 from guided_lgp.bounds.path.assembly import stay
 from guided_lgp.bounds.results import PathResult
@@ -38,7 +39,7 @@ from guided_lgp.scene import Scene, load_scene
 from guided_lgp.scene.goals import complete_objective, in_the_way
 from guided_lgp.scene.validate import validate_scene
 from guided_lgp.scene.world import initial_poses
-from guided_lgp.search.facts import out_of_reach
+from guided_lgp.search.facts import Finding, TaskFacts
 from guided_lgp.search.given import read_skeleton
 from guided_lgp.search.planners import (
     DEFAULT_SEARCH,
@@ -77,16 +78,16 @@ class PlanningResult(SearchResult):
     """Starts of the coarse bound's solver, over all sequences."""
     obstacles: tuple[Obstacle, ...] = ()
     """Without a plan: what stopped the sequences, first what is nearest to the objective."""
-    fact: str | None = None
-    """What was known before any search, if that rules a plan out."""
+    finding: Finding | None = None
+    """Without a plan: why, as far as facts tell, and what would help."""
 
     @property
     def explanation(self) -> str:
         """One line: why there is no plan and what was tried; empty if there is one."""
         if self.reason is None:
             return ""
-        if self.fact is not None:
-            return self.fact
+        if self.reason == "impossible" and self.finding is not None:
+            return self.finding.text
         outcomes = ", ".join(
             f"{self.causes.count(cause)} {outcome}"
             for cause, outcome in _OUTCOMES.items()
@@ -98,6 +99,8 @@ class PlanningResult(SearchResult):
             f"sequences with {self.solver_starts} starts of the coarse bound, {self.path_calls} of "
             "them on to the path bound)"
         )
+        if self.finding is not None:
+            return f"{self.finding.text}; {line}"
         return f"{line}; nearest to the goals: {self.obstacles[0]}" if self.obstacles else line
 
 
@@ -145,6 +148,7 @@ def plan(
     Raises:
         InputError: a fault in the scene, the objective, the names or the models.
     """
+    deadline = Deadline.after(timeout)
     check_planners(POLICIES)
     if planner not in SEARCHES:
         raise InputError("planner", f"unknown {planner!r}", ", ".join(SEARCHES))
@@ -166,10 +170,9 @@ def plan(
         accepted = ", ".join(name for name, search in SEARCHES.items() if search.over_sequences)
         raise InputError("planner", f"{planner} knows neither sequences nor places", accepted)
     params = params or load_planning()
-    deadline = Deadline.after(timeout)
     scene_bounds = SceneBounds(scene, params.bounds, deadline, goals)
-    if fact := out_of_reach(scene, scene_bounds.facts, goals):
-        return _without_search(scene, goals, None, fact)
+    if finding := TaskFacts(scene_bounds, goals, misplaced).before_search():
+        return _without_search(scene, goals, None, finding)
     search, followed = _guidance(planner, policy, models, scene)
     problem = Problem(
         scene,
@@ -218,15 +221,25 @@ class _Attempts:
         """What the searches have found, with what stopped the sequences of the last one."""
         problem, bounds = self._last, self._last.bounds
         assert isinstance(bounds, ObservedBounds)
+        obstacles = bounds.obstacles(problem.scene.state, problem.objective)
         return PlanningResult(
             **vars(found),
             scene=problem.scene,
             objective=problem.objective,
             solver_starts=bounds.starts,
-            obstacles=()
-            if found.solved
-            else bounds.obstacles(problem.scene.state, problem.objective),
+            obstacles=() if found.solved else obstacles,
+            finding=None if found.solved else _finding(problem, obstacles),
         )
+
+
+def _finding(problem: Problem, obstacles: Sequence[Obstacle]) -> Finding | None:
+    """Why a search has found nothing, by facts of the scene; None if they tell nothing in time."""
+    assert isinstance(problem.parts, SceneBounds)
+    facts = TaskFacts(problem.parts, problem.objective, problem.misplaced)
+    judged = [obstacle.example for obstacle in obstacles if obstacle.bound == "coarse"]
+    with suppress(OutOfTimeError):
+        return facts.after_search() or (facts.about(judged[0]) if judged else None)
+    return None
 
 
 def _guidance(
@@ -278,7 +291,7 @@ def _limits(
 
 
 def _without_search(
-    scene: Scene, goals: Objective, path: PathResult | None, fact: str | None = None
+    scene: Scene, goals: Objective, path: PathResult | None, finding: Finding | None = None
 ) -> PlanningResult:
     """The result where nothing has to be done, or nothing can be."""
     return PlanningResult(
@@ -298,5 +311,5 @@ def _without_search(
         times=Times(0.0, 0.0, 0.0, 0.0),
         reason=None if path else "impossible",
         solver_starts=0,
-        fact=fact,
+        finding=finding,
     )

@@ -217,6 +217,7 @@ def plan(
         "actions": [str(action) for action in result.skeleton or ()],
         "reason": result.reason,
         "explanation": result.explanation,
+        "finding": None if result.finding is None else result.finding.document(),
         "obstacles": [obstacle.document() for obstacle in result.obstacles],
         "statistics": statistics,
     }
@@ -268,8 +269,10 @@ def _say_why_not(result: "PlanningResult", summary: Mapping[str, object], as_jso
     typer.echo(f"no plan: {result.explanation}", err=True)
     for obstacle in result.obstacles[1:3]:
         typer.echo(f"also infeasible: {obstacle}", err=True)
-    if hint := _HINTS.get(result.reason):
-        typer.echo(f"hint: {hint}", err=True)
+    hints = [result.finding.help] if result.finding is not None else []
+    for hint in (*hints, _HINTS.get(result.reason)):
+        if hint:
+            typer.echo(f"hint: {hint}", err=True)
 
 
 def _origin(path: Path, shipped: Path) -> str:

@@ -8,6 +8,7 @@ any context (compare Ortiz-Haro et al., ICAPS 2022).
 from dataclasses import dataclass
 
 from guided_lgp.bounds.coarse.parts import Boxes, projected, stacked_with
+from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.logic import Action, Skeleton
 from guided_lgp.scene import Scene
 from guided_lgp.scene.footprints import footprint, gap
@@ -25,7 +26,7 @@ class Conflict:
 class Conflicts:
     """The conflicts found so far, as knowledge for a search; parts are calls of its run."""
 
-    def __init__(self, scene: Scene, run: Run) -> None:
+    def __init__(self, scene: Scene, run: Run | SceneBounds) -> None:
         self._scene, self._run = scene, run
         self._bind = scene.symbols.domain.bind
         self.found: list[Conflict] = []

@@ -1,53 +1,324 @@
-"""What is known to be impossible before any search."""
+"""Facts of a task: what single arms and supports allow, and what that says about its goals.
 
-from collections.abc import Iterator
+The facts before a search are proofs and take milliseconds. Those after one that has failed ask the
+coarse bound about small parts of the scene.
+"""
 
-from guided_lgp.bounds.coarse.facts import Facts
-from guided_lgp.logic import Objective, applicable_actions, unsatisfied
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from guided_lgp.bounds.coarse.pairs import Pairs
+from guided_lgp.bounds.coarse.parts import Boxes, stacked_with
+from guided_lgp.bounds.scene_bounds import SceneBounds
+from guided_lgp.domains import extensions, load_domain
+from guided_lgp.logic import (
+    Action,
+    Objective,
+    Skeleton,
+    applicable_actions,
+    format_skeleton,
+    successor,
+    unsatisfied,
+)
 from guided_lgp.logic.grounding import ground_instructions
 from guided_lgp.logic.objectives import parents_wanted_by
-from guided_lgp.scene import Scene
+from guided_lgp.robots import Robot
+from guided_lgp.scene.bodies import Box
+from guided_lgp.scene.footprints import footprint, gap
+from guided_lgp.scene.model import grasp_axes
+from guided_lgp.scene.tolerances import MARGIN
+from guided_lgp.search.conflicts import Conflicts
+
+Kind = Literal["width", "reach", "room", "way", "blocked", "part"]
+
+KINDS: dict[Kind, str] = {
+    "width": "too wide for the fingers",
+    "reach": "out of reach",
+    "room": "no room",
+    "way": "no arm for the whole way",
+    "blocked": "neighbours in the way",
+    "part": "no solution even alone",
+}
+"""What may be found, in the words of the glossary."""
+
+_FINGERS = 0.03
+"""Gap (m) between boxes into which no finger fits."""
 
 
-def out_of_reach(scene: Scene, facts: Facts, objective: Objective) -> str | None:
-    """Why a goal cannot be reached by any sequence of actions, in words; None if nothing is known.
+@dataclass(frozen=True)
+class Finding:
+    """Why a goal cannot be reached, and what would help."""
 
-    A body that no arm can grasp where it stands, on furniture, stays there; and furniture on which
-    no arm can put a body never carries it.
-    """
-    found = next(_unreachable(scene, facts, objective), None)
-    return None if found is None else f"{found} is out of reach of {_arms(scene)}"
+    kind: Kind
+    text: str
+    help: str
+
+    def document(self) -> dict[str, str]:
+        """The JSON document."""
+        return vars(self)
 
 
-def _unreachable(scene: Scene, facts: Facts, objective: Objective) -> Iterator[str]:
-    for goal in unsatisfied(scene.state, objective):
-        for body, parents in parents_wanted_by(goal, scene.symbols).items():
-            if scene.state.parent_of(body) in parents:
+class TaskFacts:
+    """The facts of one objective in one scene, each found when it is first asked for."""
+
+    def __init__(
+        self, bounds: SceneBounds, objective: Objective, misplaced: Iterable[str] = ()
+    ) -> None:
+        """Begin with none.
+
+        Args:
+            bounds: of the scene.
+            objective: the goals.
+            misplaced: bodies that the goals want elsewhere on what they stand on.
+        """
+        self.scene = bounds.scene
+        self._misplaced = sorted(misplaced)
+        self._bounds = bounds
+        self._objective = objective
+        self._symbols, self._state = self.scene.symbols, self.scene.state
+        self._boxes = {box.name: box for box in self.scene.movable}
+
+    def before_search(self) -> Finding | None:
+        """What rules a plan out whatever is tried; None if nothing is known to."""
+        return next(self._proofs(), None)
+
+    def after_search(self) -> Finding | None:
+        """What small parts of the scene say when a search has found nothing.
+
+        Raises:
+            OutOfTimeError: the deadline of the bounds has passed.
+        """
+        return next(self._suspicions(), None)
+
+    def about(self, skeleton: Skeleton) -> Finding | None:
+        """The smallest part of an infeasible sequence that is infeasible alone, if not all of it.
+
+        Raises:
+            OutOfTimeError: the deadline of the bounds has passed.
+        """
+        conflicts = Conflicts(self.scene, self._bounds)
+        conflicts.learn(skeleton)
+        (found,) = conflicts.found
+        if found.boxes == set(self._boxes):
+            return None
+        names = " and ".join(name for name in self._boxes if name in found.boxes)
+        actions = format_skeleton(found.actions)
+        text = f"{actions} cannot be done, even with {names} alone in the scene"
+        return Finding("part", text, f"move {names} or the robot, or take another way")
+
+    # before
+
+    def _proofs(self) -> Iterator[Finding]:
+        for body, parents in self._moves():
+            if self._state.support_of(body) in self._symbols.surfaces:
+                yield from self._stuck(body)
+            if self._denied(body, parents):
+                yield self._out_of_reach(" and ".join(sorted(parents)))
+        for support in self._symbols.tables:
+            yield from self._crowded(support)
+
+    def _moves(self) -> Iterator[tuple[str, frozenset[str]]]:
+        """The bodies that goals want elsewhere, and the parents that they leave to them."""
+        for goal in unsatisfied(self._state, self._objective):
+            for body, parents in parents_wanted_by(goal, self._symbols).items():
+                if self._state.parent_of(body) not in parents:
+                    yield body, parents
+        for body in self._misplaced:
+            yield body, frozenset({self._state.parent_of(body)})
+
+    def _stuck(self, body: str) -> Iterator[Finding]:
+        """Why no arm can move a body from the furniture that it stands on."""
+        size = self._boxes[body].size
+        widest = max(arm.fingers.grasp_width for arm in self._robot.arms.values())
+        if not grasp_axes(size, widest):
+            yield Finding(
+                "width",
+                f"{body} is too wide for the fingers: {min(size[:2]):.3f} m at its narrowest side",
+                f"a side of at most {widest:.3f} m",
+            )
+        if all(map(self._bounds.out_of_reach, ((move,) for move in self._takings(body)))):
+            yield self._out_of_reach(body)
+
+    def _denied(self, body: str, parents: frozenset[str]) -> bool:
+        """Whether all parents are furniture on which no arm can put a body."""
+        ways = [
+            one
+            for one in ground_instructions(self._symbols)
+            if one.body == body and one.parent in parents
+        ]
+        surfaces = set(self._symbols.surfaces)
+        return parents <= surfaces and all(map(self._bounds.facts.never, ways))
+
+    def _out_of_reach(self, names: str) -> Finding:
+        text = f"{names} is out of reach of {self._every_arm}"
+        return Finding("reach", text, f"move {names} or the robot")
+
+    def _crowded(self, support: str) -> Iterator[Finding]:
+        """Boxes of which goals want too many on one support, however they are turned.
+
+        Around its middle every box has a disc to itself, and the middle is above the support, but
+        for a counterweight, which shifts it within the box.
+        """
+        boxes = [self._boxes[name] for name in self._wanted_on(support)]
+        spare = len(self._boxes) - len(boxes) - (support in self._boxes)
+        half = np.array(self._rest(support)) + (spare > 0) * _longest(boxes)
+        for i, one in enumerate(boxes):
+            for other in boxes[:i]:
+                need = _shortest(one) + _shortest(other) - MARGIN
+                most = 2 * float(np.hypot(*half))
+                if need > most:
+                    yield Finding(
+                        "room",
+                        f"no room on {support} for {other.name} and {one.name}: their middles "
+                        f"would be {need:.3f} m apart at least, and can be {most:.3f} m at most",
+                        "a larger support, or another one for one of them",
+                    )
+        covered = sum(4 * box.convex.half[0] * box.convex.half[1] for box in boxes)
+        beyond = half + _longest(boxes)
+        free = 4 * float(np.prod(beyond))
+        if len(boxes) > 1 and all(box.shape == "box" for box in boxes) and covered > free:
+            names = ", ".join(box.name for box in boxes)
+            yield Finding(
+                "room",
+                f"no room on {support} for {names}: they cover {covered:.3f} m², and no more than "
+                f"{free:.3f} m² is above and around it",
+                "a larger support, or another one for some of them",
+            )
+
+    def _wanted_on(self, support: str) -> list[str]:
+        """The boxes that goals want on a support."""
+        wanted = [parents_wanted_by(goal, self._symbols) for goal in self._objective]
+        found = {body for one in wanted for body, parents in one.items() if parents == {support}}
+        return sorted(found)
+
+    def _rest(self, support: str) -> tuple[float, float]:
+        bodies = {body.name: body for body in (*self.scene.supports, *self.scene.movable)}
+        return bodies[support].convex.rest
+
+    # after
+
+    def _suspicions(self) -> Iterator[Finding]:
+        moves = list(self._moves())
+        for body, _ in moves:
+            if not self.graspable_by(body) and self._takings(body):
+                text = f"{self._every_arm} fail to grasp {body} there, even alone in the scene"
+                yield Finding("reach", text, f"move {body} or the robot, or a smaller {body}")
+            yield from self._deadlock(body)
+        for body, parents in moves:
+            if parents <= set(self._symbols.surfaces):
+                yield from self._no_way(body, parents)
+
+    def graspable_by(self, body: str) -> tuple[str, ...]:
+        """The grippers that can take a body where it is at the start, alone with its stack."""
+        takings = self._takings(body)
+        return tuple(action.symbols[0] for action in takings if self._alone((action,)))
+
+    def reachable_by(self, body: str, support: str) -> tuple[str, ...]:
+        """The grippers that can take a body and put it on a support, alone with its stack."""
+        found = []
+        for taking in self._takings(body):
+            after = successor(self._state, taking)
+            for action in applicable_actions(after, self._symbols):
+                one = self._symbols.domain.bind(action)
+                if (one.body, one.parent, one.actor) == (body, support, taking.symbols[0]):
+                    found += [one.actor] if self._alone((taking, action)) else []
+        return tuple(found)
+
+    def _no_way(self, body: str, parents: Iterable[str]) -> Iterator[Finding]:
+        """No single arm brings a body to any of some supports."""
+        supports = sorted(parents)
+        if any(self.reachable_by(body, support) for support in supports):
+            return
+        names, arms = " or ".join(supports), " and ".join(self.graspable_by(body))
+        takes = self._further_instructions()
+        yield Finding(
+            "way",
+            f"{body} can be taken by {arms}, which cannot put it on {names}, "
+            "even alone in the scene",
+            f"furniture between, which both arms reach{takes}; or move {names} or the robot",
+        )
+
+    def _further_instructions(self) -> str:
+        """What a domain that extends that of the scene would add, in words."""
+        own = {instruction.name for instruction in self._symbols.domain.instructions}
+        wider = extensions(self.scene.domain)
+        added = {
+            name: [one.name for one in load_domain(name).instructions if one.name not in own]
+            for name in wider
+        }
+        return "".join(f"; --domain {name} ({', '.join(new)})" for name, new in added.items())
+
+    def _deadlock(self, body: str) -> Iterator[Finding]:
+        """Boxes, beginning with one, none of which can be taken while the others are there."""
+        found = [body]
+        for name in found:  # it grows on the way
+            blockers = self._blockers(name)
+            if not blockers or self._state.support_of(name) not in self._symbols.surfaces:
+                return
+            found += sorted(set().union(*blockers) - set(found))
+        if len(found) > 1:
+            names = [name for name in self._boxes if name in found]
+            several = ", ".join(names)
+            yield Finding(
+                "blocked",
+                f"the {self._hand(names)} do not fit between {several}: none of them can be taken "
+                "while the others stand there",
+                f"space between {several}",
+            )
+
+    def _blockers(self, body: str) -> list[Boxes]:
+        """For every arm that can take a body alone, what keeps it from it; none if one is free."""
+        sets = []
+        for action in self._takings(body):
+            blockers = self._pairs.blockers(action)
+            if Boxes() in blockers:
                 continue
-            if _stuck(scene, facts, body):
-                yield body
-            if _denied(scene, facts, body, parents):
-                yield " and ".join(sorted(parents))
+            if not blockers:
+                return []
+            sets.append(Boxes().union(*blockers))
+        return sets
+
+    def _hand(self, names: list[str]) -> str:
+        """What does not fit: fingers, or hands where there is more space."""
+        places = [footprint(self._boxes[name]) for name in names]
+        nearest = [min(gap(a, b) for b in places if b is not a) for a in places]
+        return "fingers" if max(nearest) < _FINGERS else "hands"
+
+    def _takings(self, body: str) -> list[Action]:
+        """The ways to take a body at the start."""
+        bind = self._symbols.domain.bind
+        every = applicable_actions(self._state, self._symbols)
+        return [a for a in every if bind(a).body == body and bind(a).into_hand]
+
+    def _alone(self, skeleton: tuple[Action, ...]) -> bool:
+        body = self._symbols.domain.bind(skeleton[-1]).body
+        boxes = stacked_with(skeleton, self.scene, body)
+        prefixes = (skeleton[:length] for length in range(1, len(skeleton) + 1))
+        return all(self._bounds.part(boxes, prefix).feasible for prefix in prefixes)
+
+    @cached_property
+    def _pairs(self) -> Pairs:
+        return Pairs(self.scene, self._bounds.coarse, self._bounds.part)
+
+    @property
+    def _robot(self) -> Robot:
+        return self.scene.robot.description
+
+    @property
+    def _every_arm(self) -> str:
+        count = len(self._symbols.grippers)
+        return {1: "the arm", 2: "both arms"}.get(count, f"all {count} arms")
 
 
-def _stuck(scene: Scene, facts: Facts, body: str) -> bool:
-    """Whether no arm can move a body from the furniture that it stands on."""
-    bind = scene.symbols.domain.bind
-    actions = applicable_actions(scene.state, scene.symbols)
-    moves = [action for action in actions if bind(action).body == body]
-    on_furniture = scene.state.support_of(body) in scene.symbols.surfaces
-    return on_furniture and all(facts.impossible((action,)) for action in moves)
+def _shortest(box: Box) -> float:
+    """Radius (m) of the largest disc in a box seen from above."""
+    return min(box.convex.rest if box.shape == "mesh" else box.convex.half[:2])
 
 
-def _denied(scene: Scene, facts: Facts, body: str, parents: frozenset[str]) -> bool:
-    """Whether all parents are furniture on which no arm can put a body."""
-    symbols = scene.symbols
-    ways = [
-        one for one in ground_instructions(symbols) if one.body == body and one.parent in parents
-    ]
-    return parents <= set(symbols.surfaces) and all(facts.never(one) for one in ways)
-
-
-def _arms(scene: Scene) -> str:
-    arms = scene.symbols.grippers
-    return {1: "the arm", 2: "both arms"}.get(len(arms), f"all {len(arms)} arms")
+def _longest(boxes: Iterable[Box]) -> float:
+    """How far (m) a corner of one of some boxes is from its middle at most."""
+    return max((float(np.hypot(*box.convex.half[:2])) for box in boxes), default=0.0)

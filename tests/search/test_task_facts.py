@@ -1,0 +1,109 @@
+"""Facts of tasks: proofs before a search, and what small parts of a scene say after one."""
+
+from pathlib import Path
+
+import pytest
+
+from guided_lgp.bounds.deadline import Deadline, OutOfTimeError
+from guided_lgp.bounds.scene_bounds import SceneBounds
+from guided_lgp.logic import parse_objective, parse_skeleton
+from guided_lgp.params import load_planning
+from guided_lgp.scene import Box, Scene, load_scene
+from guided_lgp.search.facts import KINDS, Finding, TaskFacts
+
+ROOT = Path(__file__).parents[2]
+NEAR = load_scene(ROOT / "examples" / "three_boxes.json")
+ROW = load_scene(ROOT / "tests" / "cases" / "touching_row.json")
+FAR = load_scene(ROOT / "tests" / "cases" / "handover_only.json")
+
+
+def facts(scene: Scene, *goals: str, deadline: float | None = None) -> TaskFacts:
+    bounds = SceneBounds(scene, load_planning().bounds, Deadline.after(deadline))
+    return TaskFacts(bounds, parse_objective(goals))
+
+
+def resized(scene: Scene, **sizes: tuple[float, float, float]) -> Scene:
+    """The scene with other sizes of some boxes, which still stand where they stood."""
+    boxes = []
+    for box in scene.boxes:
+        size = sizes.get(box.name, box.size)
+        x, y, z = box.position
+        position = (x, y, z + (size[2] - box.size[2]) / 2)
+        boxes.append(box.model_copy(update={"size": size, "position": position}))
+    return scene.model_copy(update={"boxes": tuple(boxes)})
+
+
+def found(finding: Finding | None) -> Finding:
+    assert finding is not None
+    assert finding.kind in KINDS
+    assert finding.help
+    return finding
+
+
+def test_what_can_be_done_is_not_ruled_out() -> None:
+    for goals in (["(on red green)", "(held blue)"], ["(on red tab2)", "(on green tab2)"]):
+        assert facts(NEAR, *goals).before_search() is None
+    assert facts(NEAR, "(on red tab2)").after_search() is None
+
+
+def test_a_box_too_wide_is_told_before_a_search() -> None:
+    wide = resized(NEAR, red=(0.15, 0.12, 0.1))
+    finding = found(facts(wide, "(on red tab2)").before_search())
+    assert finding.kind == "width"
+    assert finding.text == "red is too wide for the fingers: 0.120 m at its narrowest side"
+    assert facts(wide, "(on green tab1)").before_search() is None, "nobody wants red"
+
+
+def test_no_room_for_two() -> None:
+    broad = resized(NEAR, red=(0.15, 0.08, 0.1), blue=(0.15, 0.08, 0.1), green=(0.04, 0.03, 0.1))
+    finding = found(facts(broad, "(on red green)", "(on blue green)").before_search())
+    assert (finding.kind, finding.text.split(":")[0]) == (
+        "room",
+        "no room on green for blue and red",
+    )
+    assert "0.075 m apart at least, and can be 0.050 m at most" in finding.text
+    assert facts(NEAR, "(on red green)", "(on blue green)").before_search() is None
+
+
+def test_no_room_by_area() -> None:
+    def standing(number: int) -> Box:
+        return Box(name=f"b{number}", size=(0.2, 0.08, 0.1), position=(0.5, 0.3, 0.65), on="tab1")
+
+    boxes = tuple(standing(number) for number in range(25))
+    goals = [f"(on b{number} tab2)" for number in range(25)]
+    many = NEAR.model_copy(update={"boxes": boxes})
+    finding = found(facts(many, *goals).before_search())
+    assert finding.kind == "room"
+    assert "they cover 0.400 m²" in finding.text
+    assert facts(many, *goals[:7]).before_search() is None
+
+
+def test_who_reaches_what() -> None:
+    task = facts(FAR, "(on parcel farright)")
+    assert task.before_search() is None
+    assert task.graspable_by("parcel") == ("pr2L",)
+    assert task.reachable_by("parcel", "farleft") == ("pr2L",)
+    assert task.reachable_by("parcel", "farright") == ()
+    assert found(task.after_search()).kind == "way"
+
+
+def test_boxes_that_block_each_other_are_named() -> None:
+    finding = found(facts(ROW, "(on p2 right)").after_search())
+    assert finding.kind == "blocked"
+    assert "between p1, p2, p3" in finding.text
+    p1, p2, p3 = ROW.boxes
+    apart = p3.model_copy(update={"position": (0.54, 0.49, 0.65)})
+    loose = ROW.model_copy(update={"boxes": (p1, p2, apart)})
+    assert facts(loose, "(on p3 right)").after_search() is None
+
+
+def test_the_part_of_a_sequence_that_cannot_be_done() -> None:
+    task = facts(ROW, "(on p1 right)")
+    finding = found(task.about(parse_skeleton("(grasp pr2L p1)")))
+    assert finding.kind == "part"
+    assert finding.text == "(grasp pr2L p1) cannot be done, even with p1 and p2 alone in the scene"
+
+
+def test_the_limit_of_time_holds() -> None:
+    with pytest.raises(OutOfTimeError):
+        facts(ROW, "(on p2 right)", deadline=0.0).after_search()
