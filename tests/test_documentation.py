@@ -12,6 +12,10 @@ from pathlib import Path
 
 import pytest
 
+import guided_lgp
+from guided_lgp.cli.files import Format
+from guided_lgp.schemas import SCHEMAS
+
 ROOT = Path(__file__).parents[1]
 PAGES = sorted(
     page
@@ -99,7 +103,11 @@ def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
         timeout=300,
     )
     assert done.returncode == 0, done.stderr
-    assert (tmp_path / "schemas" / "scene.schema.json").is_file()
+    written = {file.name.split(".")[0] for file in (tmp_path / "schemas").iterdir()}
+    assert written == set(SCHEMAS) == {name.value for name in Format}
+    page = (tmp_path / "api" / "index.html").read_text(encoding="utf-8")
+    documented = {address.rpartition(".")[2] for address in re.findall(r'id="([\w.]+)"', page)}
+    assert set(guided_lgp.__all__) - {"Scene"} <= documented  # a Scene is the file that it is in
 
 
 @pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda file: file.stem)

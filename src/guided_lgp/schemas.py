@@ -9,6 +9,7 @@ from guided_lgp.errors import InputError
 
 SCHEMAS = {
     "scene": "guided_lgp.scene.model:Scene",
+    "robot": "guided_lgp.robots.document:RobotDocument",
     "plan": "guided_lgp.bounds.plan_file:Plan",
     "planning": "guided_lgp.params:PlanningParams",
     "params": "guided_lgp.params:Params",

@@ -100,6 +100,7 @@ class Format(str, Enum):
     """Files that have a JSON Schema."""
 
     SCENE = "scene"
+    ROBOT = "robot"
     PLAN = "plan"
     PLANNING = "planning"
     PARAMS = "params"
