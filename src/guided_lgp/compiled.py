@@ -14,6 +14,9 @@ from functools import cache
 from hashlib import sha256
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
 
 from guided_lgp.cache import is_whole, made, private_folder
 
@@ -66,6 +69,11 @@ def load_compiled(name: str, source: str) -> ctypes.CDLL | None:
         entry = f"{name}-{platform.machine()}-{_identity(commands[0])}-{digest[:16]}.so"
         file = made(entry, lambda folder: _make(code, commands, answer, folder))
     return None if file is None else ctypes.CDLL(str(file))
+
+
+def address(array: NDArray[Any] | None) -> ctypes.c_void_p:
+    """Where a contiguous array begins; null for none."""
+    return ctypes.c_void_p(None if array is None else array.ctypes.data)
 
 
 def _compilers() -> Iterator[list[str]]:

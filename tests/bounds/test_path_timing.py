@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from guided_lgp.bounds.path import timing
+from guided_lgp.bounds.path import spline, timing
 from guided_lgp.bounds.path.timing import INTERVAL, time_path
 from guided_lgp.robots import load_robot
 
@@ -49,7 +49,27 @@ def test_no_motion_takes_no_time() -> None:
 @pytest.mark.parametrize("path", [ENDS, _curved(), _curved()[:3]], ids=["line", "curve", "short"])
 def test_compiled_and_numpy_agree(path: np.ndarray, monkeypatch: pytest.MonkeyPatch) -> None:
     times, rows = time_path(path, ARM)
-    monkeypatch.setattr(timing, "_library", lambda: None)
+    for module in (timing, spline):
+        monkeypatch.setattr(module, "_library", lambda: None)
     others, same = time_path(path, ARM)
     assert times == pytest.approx(others, rel=1e-6)
     assert rows == pytest.approx(same, abs=1e-6)
+
+
+@pytest.mark.parametrize("count", [2, 3, 12])
+def test_splines_are_those_of_scipy(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(count)
+    s, points, ends = (
+        np.cumsum(rng.uniform(0.1, 1, count)),
+        rng.normal(size=(count, 3)),
+        rng.normal(size=(2, 3)),
+    )
+    at = np.linspace(s[0], s[-1], 40)
+    for out, into in ((None, None), (ends[0], None), (None, ends[1]), (ends[0], ends[1])):
+        ours = spline.Cubic(s, points, out, into)
+        with monkeypatch.context() as patch:
+            patch.setattr(spline, "_library", lambda: None)
+            theirs = spline.Cubic(s, points, out, into)
+        assert ours(at) == pytest.approx(theirs(at), abs=1e-9)
+        for one, other in zip(ours.derivatives(at), theirs.derivatives(at), strict=True):
+            assert one == pytest.approx(other, abs=1e-8)

@@ -26,11 +26,11 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from guided_lgp.bounds.path.motions import Motion, Mover, Transit
 from guided_lgp.bounds.path.situation import Step
 from guided_lgp.bounds.path.spaces import STEP
+from guided_lgp.bounds.path.spline import Cubic
 from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.bounds.results import Array
 from guided_lgp.robots import Arm, PlacedArm, Robot
@@ -196,14 +196,12 @@ class _Spline:
 
     def sampled(self, points: Array) -> Array:
         """Through (WAYPOINTS + 2, n), at steps that are short enough for collision checks."""
-        rest = (2, np.zeros(points.shape[1]))
-        ends = (rest if slope is None else (1, slope) for slope in (self.out, self.into))
-        curve = CubicSpline(self.knots, points, bc_type=tuple(ends))
+        curve = Cubic(self.knots, points, self.out, self.into)
         fine = np.linspace(0.0, self.knots[-1], _FINE)
         ways = np.sum(np.abs(np.diff(curve(fine), axis=0)) * self.reaches, axis=1)
         way = np.concatenate([[0.0], np.cumsum(ways)])
         marks = np.linspace(0.0, way[-1], 2 + int(way[-1] / STEP))
-        path = np.asarray(curve(np.interp(marks, way, fine)))
+        path = curve(np.interp(marks, way, fine))
         path[0], path[-1] = points[0], points[-1]
         return path
 

@@ -1,55 +1,6 @@
-/* Natural cubic splines and their fastest timing, as in timing.py, which explains both. Points are
- * (count, joints) by rows.
- */
+/* The fastest timing of a path, as in timing.py, which explains it. */
 #include <math.h>
 #include <stdlib.h>
-
-/* Second derivatives of the natural spline through points at parameters s. */
-void spline(int count, int joints, const double *s, const double *points, double *second)
-{
-    double *ratio = malloc(sizeof(double) * count);
-    ratio[0] = 0;
-    for (int k = 0; k < joints; k++)
-        second[k] = second[(count - 1) * joints + k] = 0;
-    for (int i = 1; i < count - 1; i++) {
-        double before = s[i] - s[i - 1], after = s[i + 1] - s[i];
-        double pivot = 2 * (before + after) - before * ratio[i - 1];
-        ratio[i] = after / pivot;
-        for (int k = 0; k < joints; k++) {
-            const double *y = points + i * joints + k;
-            double bend = 6 * ((y[joints] - y[0]) / after - (y[0] - y[-joints]) / before);
-            second[i * joints + k] = (bend - before * second[(i - 1) * joints + k]) / pivot;
-        }
-    }
-    for (int i = count - 2; i > 0; i--)
-        for (int k = 0; k < joints; k++)
-            second[i * joints + k] -= ratio[i] * second[(i + 1) * joints + k];
-    free(ratio);
-}
-
-/* Values and the first two derivatives at ascending parameters; each may be null. */
-void evaluate(int count, int joints, const double *s, const double *points, const double *second,
-              int places, const double *at, double *value, double *slope, double *bend)
-{
-    int i = 0;
-    for (int p = 0; p < places; p++) {
-        while (i < count - 2 && at[p] >= s[i + 1])
-            i++;
-        double h = s[i + 1] - s[i], a = s[i + 1] - at[p], b = at[p] - s[i];
-        for (int k = 0; k < joints; k++) {
-            double m0 = second[i * joints + k], m1 = second[(i + 1) * joints + k];
-            double y0 = points[i * joints + k] / h - m0 * h / 6;
-            double y1 = points[(i + 1) * joints + k] / h - m1 * h / 6;
-            int e = p * joints + k;
-            if (value)
-                value[e] = (m0 * a * a * a + m1 * b * b * b) / (6 * h) + y0 * a + y1 * b;
-            if (slope)
-                slope[e] = (m1 * b * b - m0 * a * a) / (2 * h) + y1 - y0;
-            if (bend)
-                bend[e] = (m0 * a + m1 * b) / h;
-        }
-    }
-}
 
 /* The limits of one interval: x may be at most `most`, and row k relates the x of both its ends. */
 typedef struct {

@@ -14,12 +14,12 @@ is, and those with it are affine in it: a step of a pass is the minimum of a few
 import ctypes
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from guided_lgp.bounds.path.spline import Cubic
 from guided_lgp.bounds.results import Array
-from guided_lgp.compiled import load_compiled
+from guided_lgp.compiled import address, load_compiled
 from guided_lgp.robots import Arm
 
 INTERVAL = 0.05
@@ -49,7 +49,7 @@ def time_path(path: Array, arm: Arm) -> tuple[Array, Array]:
     s = np.concatenate([[0.0], np.cumsum(lengths[lengths > 1e-9])])
     if len(path) == 1:
         return np.zeros(1), path
-    curve = Natural(s, path)
+    curve = Cubic(s, path)
     velocity, acceleration = _SHARE * arm.velocity_limits, _SHARE * arm.acceleration_limits
     grid = np.linspace(0.0, s[-1], max(10, int(s[-1] / _GRID_STEP)))
     speeds = np.sqrt(fastest(grid, *curve.derivatives(grid), velocity, acceleration))
@@ -59,44 +59,6 @@ def time_path(path: Array, arm: Arm) -> tuple[Array, Array]:
     rows = np.asarray(curve(_along(grid, speeds, moments, times)))
     rows[0], rows[-1] = path[0], path[-1]
     return times * _stretch(rows, float(step), velocity, acceleration), rows
-
-
-class Natural:
-    """The natural cubic spline through points (m, n) at ascending parameters (m,)."""
-
-    def __init__(self, s: Array, points: Array) -> None:
-        self._s, self._points = s, np.ascontiguousarray(points)
-        self._library, self._curve = _library(), None
-        if self._library is None:
-            from scipy.interpolate import CubicSpline  # slow to import
-
-            self._curve = CubicSpline(s, points, bc_type="natural")
-            return
-        self._second = np.empty_like(self._points)
-        self._library.spline(*points.shape, *map(_at, (s, self._points, self._second)))
-
-    def __call__(self, at: Array) -> Array:
-        """Points (k, n) at ascending parameters (k,)."""
-        if self._curve is not None:
-            return np.asarray(self._curve(at))
-        value = np.empty((len(at), self._points.shape[1]))
-        self._evaluate(at, value, None, None)
-        return value
-
-    def derivatives(self, at: Array) -> tuple[Array, Array]:
-        """The first and the second (k, n)."""
-        if self._curve is not None:
-            return self._curve(at, 1), self._curve(at, 2)
-        slope, bend = np.empty((2, len(at), self._points.shape[1]))
-        self._evaluate(at, None, slope, bend)
-        return slope, bend
-
-    def _evaluate(self, at: Array, *found: Array | None) -> None:
-        assert self._library is not None
-        arrays = (self._s, self._points, self._second)
-        self._library.evaluate(
-            *self._points.shape, *map(_at, arrays), len(at), *map(_at, (at, *found))
-        )
 
 
 def fastest(
@@ -117,7 +79,7 @@ def fastest(
     x = np.empty(len(grid))
     arrays = (grid, slopes, bends, velocity, acceleration)
     limits = (ctypes.c_double(_STILL), ctypes.c_double(_SLOWEST))
-    library.fastest(*slopes.shape, *map(_at, arrays), *limits, _at(x))
+    library.fastest(*slopes.shape, *map(address, arrays), *limits, address(x))
     return x
 
 
@@ -179,8 +141,3 @@ def _stretch(rows: Array, step: float, velocity: Array, acceleration: Array) -> 
 def _library() -> ctypes.CDLL | None:
     source = Path(__file__).with_name("timing.c").read_text(encoding="utf-8")
     return load_compiled("timing", source)
-
-
-def _at(array: Array | None) -> Any:
-    """Where an array begins; it must be contiguous."""
-    return ctypes.c_void_p(None if array is None else array.ctypes.data)
