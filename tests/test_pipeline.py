@@ -35,6 +35,7 @@ CASES = {
     "demonstrate": "guided_lgp.cases.demonstrate",
     "train_case": "guided_lgp.cases.train",
     "evaluate_case": "guided_lgp.cases.evaluate",
+    "replay_case": "guided_lgp.cases.replay",
     "collect_cases": "guided_lgp.cases.collect",
 }
 """Those of the cases."""
@@ -70,7 +71,7 @@ def test_the_cases_depend_on_their_sources_and_are_those_of_the_parameters() -> 
         missing = missing_sources(module, stages[stage].get("do", stages[stage])["deps"])
         assert not missing, f"{stage}: {missing}"
     names = list(PARAMS.cases)
-    assert stages["demonstrate"]["foreach"] == names
+    assert stages["demonstrate"]["foreach"] == stages["replay_case"]["foreach"] == names
     for stage in ("train_case", "evaluate_case"):
         assert stages[stage]["matrix"]["case"] == names
     for case in PARAMS.cases.values():

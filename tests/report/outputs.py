@@ -95,6 +95,24 @@ def spread() -> dict[str, Any]:
     return {"paper": searches, "improved": searches, "relational": {"adaptation": subsets}}
 
 
+def cases() -> dict[str, Any]:
+    """Figures as ``make cases`` writes them."""
+    cell = {"scenes": 20, "trainings": 1, "problems": 20, "solved": 10, "solved_min": 10}
+    means = {"calls_mean": 18.5, "infeasible_calls_mean": 7.0, "plan_length_mean": 5.0}
+    learnt = {"trainings": 3, "problems": 60, "solved": 60, "solved_min": 20, "calls_mean": 6.5}
+    without = cell | means | {"path_verified_share": None, "physics_share": None}
+    ours = without | learnt | {"path_verified_share": 1.0, "physics_share": 0.95}
+    return {"rows": {size: {"facts": without, "relational": ours} for size in ("4", "5")}}
+
+
+def cases_compared() -> dict[str, Any]:
+    """The policy against the best rival: half its calls and less, or not."""
+    ratio = {"rival": "facts", "calls": 6.5, "rival_calls": 18.5, "low": 0.3, "high": 0.4}
+    given = ratio | {"rival": "facts_tuned", "rival_calls": 7.0, "ratio": 0.93}
+    sizes = {"with_facts": ratio | {"ratio": 0.35}, "facts_given": given}
+    return {"rows": {"4": sizes, "5": sizes}}
+
+
 def _verdicts(scene: Scene, rng: np.random.Generator) -> list[dict[str, Any]]:
     rows, open_ = [], [((), scene.state)]
     for _ in range(3):

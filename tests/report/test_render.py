@@ -195,6 +195,8 @@ def test_rendering_again_gives_the_same_bytes_and_other_figures_are_optional(
     (root / "reports/figures/old.png").touch()
     write_json(root / METRICS / "geometry.json", outputs.geometry())
     write_json(root / "reports/studies/spread.json", outputs.spread())
+    write_json(root / "reports/cases.json", outputs.cases())
+    write_json(root / "reports/cases_compared.json", outputs.cases_compared())
     render.run(params, root)
     before = {
         path.relative_to(rendered): path.read_bytes()
@@ -209,12 +211,14 @@ def test_rendering_again_gives_the_same_bytes_and_other_figures_are_optional(
     new = {str(path) for path in after.keys() - before.keys()}
     assert new == {"reports/metrics/geometry.json", "reports/studies/spread.json"} | {
         f"reports/tables/{name}.{suffix}"
-        for name in ("geometry", "draws")
+        for name in ("geometry", "draws", "case_rows")
         for suffix in ("md", "tex", "csv")
     }
     assert all(after[path] == content for path, content in before.items())
     page = (root / "reports/report.html").read_text(encoding="utf-8")
     assert "The two bounds of the NLP on random sequences" in page
+    assert "The policy needs at most half the calls at every size." in page
+    assert "then learning is a convenience, not a necessity" in page
     assert '<a href="../docs/studies.md">' in page
     rows = {row[0]: row[1:] for row in rows_of(root / "reports/tables/draws.md")}
     assert rows["Paper's networks"] == ["92.0% ± 2.0%"] * 6 + ["3"]

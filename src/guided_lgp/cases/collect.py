@@ -5,6 +5,8 @@ from pathlib import Path
 from statistics import fmean
 from typing import Any
 
+import numpy as np
+
 from guided_lgp.cases.policies import RIVALS
 from guided_lgp.documents import read_json, write_json
 from guided_lgp.params import Case, Params
@@ -12,16 +14,20 @@ from guided_lgp.paths import REPORTS
 
 RESULTS = REPORTS / "cases.json"
 TIMES = REPORTS / "cases_timing.json"
+COMPARED = REPORTS / "cases_compared.json"
+POLICY = "relational"
+"""The planner that is compared with the rivals."""
 Row = dict[str, Any]
 Figures = dict[str, dict[str, dict[str, Row]]]
 """By case, size and planner."""
 
 
 def run(params: Params, root: Path) -> None:
-    """Write ``reports/cases.json`` and ``reports/cases_timing.json``."""
+    """Write ``reports/cases.json``, ``cases_timing.json`` and ``cases_compared.json``."""
     rows = {name: read_rows(root, name, case) for name, case in params.cases.items()}
     write_json(root / RESULTS, by_cell(rows, figures))
     write_json(root / TIMES, by_cell(rows, times))
+    write_json(root / COMPARED, {name: compared(found) for name, found in rows.items()})
 
 
 def read_rows(root: Path, name: str, case: Case) -> list[Row]:
@@ -107,3 +113,46 @@ def _mean(values: Iterable[float]) -> float | None:
 
 def _share(values: Iterable[Any]) -> float | None:
     return _mean(float(value) for value in values if value is not None)
+
+
+def compared(rows: Sequence[Row]) -> dict[str, Row]:
+    """By size: the calls of the policy as a share of the best rival's, paired by scene.
+
+    The best rival is the one without learning that needs the fewest calls, limits counted. Once all
+    calls count, once those on parts of a scene do not: as if facts were there already.
+    """
+    found = {}
+    for size in sorted({row["size"] for row in rows}):
+        cell = [row for row in rows if row["size"] == size]
+        found[str(size)] = {
+            "with_facts": _best_ratio(cell, limited),
+            "facts_given": _best_ratio(cell, lambda row: limited(row) - row["part_calls"]),
+        }
+    return found
+
+
+def _best_ratio(cell: Sequence[Row], calls: Callable[[Row], int]) -> Row:
+    scenes = sorted({row["scene"] for row in cell})
+
+    def by_scene(planner: str) -> list[float]:
+        own = [row for row in cell if row["planner"] == planner]
+        return [fmean(calls(row) for row in own if row["scene"] == scene) for scene in scenes]
+
+    rivals = dict.fromkeys(row["planner"] for row in cell if row["training"] == RIVALS)
+    best = min(rivals, key=lambda planner: fmean(by_scene(planner)))
+    ours, theirs = np.array(by_scene(POLICY)), np.array(by_scene(best))
+    draws = np.random.default_rng(0).integers(len(scenes), size=(_RESAMPLED, len(scenes)))
+    ratios = ours[draws].sum(axis=1) / theirs[draws].sum(axis=1)
+    low, high = np.quantile(ratios, (0.025, 0.975))
+    return {
+        "rival": best,
+        "calls": round(float(ours.mean()), 2),
+        "rival_calls": round(float(theirs.mean()), 2),
+        "ratio": round(float(ours.sum() / theirs.sum()), 3),
+        "low": round(float(low), 3),
+        "high": round(float(high), 3),
+    }
+
+
+_RESAMPLED = 2000
+"""Draws of scenes, with replacement, behind each interval of 95 %."""

@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 
 app = typer.Typer()
 
+FILE = "cases/dvc.yaml"
+"""Declares these stages."""
+
 CaseName = Annotated[str, typer.Option("--case", help="A case of params.yaml.")]
 
 
@@ -65,6 +68,17 @@ def evaluate_case(
     )
 
 
+@app.command("replay_case")
+def replay_case(case: CaseName, params: ParamsFile = PARAMS) -> None:
+    """Draw the longest plan of a case as a 3D page. Writes reports/CASE/replay.html.
+
+    Example: guided-lgp replay_case --case rows
+    """
+    from guided_lgp.cases import replay
+
+    _run("replay_case", case, lambda root, read: replay.run(read, root, case), params)
+
+
 @app.command("collect_cases")
 def collect_cases(params: ParamsFile = PARAMS) -> None:
     """Put the figures of all cases together. Writes reports/cases.json.
@@ -87,6 +101,7 @@ def _run(stage: str, case: str, work: "Callable[[Path, Params], None]", params_f
     end_with_dvc()
     params, root = load_params(params_file), Path.cwd()
     declared_case(params, case)
-    address = f"{stage}-{case}"
+    name, _, training = stage.partition("@")
+    address = f"{FILE}:{name}@{'-'.join(filter(None, (case, training)))}"
     with alone(root, address), tracking.recorded(address, params):
         work(root, params)

@@ -1,10 +1,10 @@
 """The report's sections: which table and which figure stands where, and what is said about it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from guided_lgp.params import Params
 from guided_lgp.policy.registry import TRAINED_POLICIES
-from guided_lgp.report import findings
+from guided_lgp.report import cases, findings
 from guided_lgp.report.document import (
     Block,
     Bullets,
@@ -136,6 +136,8 @@ def compose(
         Section("Differences from the paper", [Bullets(DIFFERENCES)]),
         Section("Reproduction", [*_reproduction(params)]),
     ]
+    if inputs.cases and inputs.cases_compared:
+        sections.insert(1, Section("Where geometry decides", [*_cases(inputs, tables)]))
     if replays:
         text = "Plans as 3D replays in the browser, one self-contained page each."
         sections.insert(5, Section("Replays", [text, Links(replays)]))
@@ -146,6 +148,17 @@ def compose(
         "have; and the training and geometry behind them.",
         sections,
     )
+
+
+def _cases(inputs: Inputs, tables: Mapping[str, Table]) -> Iterator[Block]:
+    """The headline: what learning is worth where symbols alone mislead."""
+    assert inputs.cases is not None
+    assert inputs.cases_compared is not None
+    yield cases.QUESTION
+    yield Bullets(cases.answers(inputs.cases_compared))
+    for name in inputs.cases:
+        yield tables[f"case_{name}"]
+        yield Links([(f"{name}/replay.html", "One plan as a 3D replay in the browser")])
 
 
 def _symmetric(params: Params) -> list[str]:

@@ -79,6 +79,10 @@ class Inputs:
     spread: Metrics | None
     """Written by ``make study``, which is not part of the pipeline either: by policy, search, set
     of objectives and figure, one value per draw of the training objectives."""
+    cases: Metrics | None
+    """Written by ``make cases``, which is not part of it either: by case, size and planner ..."""
+    cases_compared: Metrics | None
+    """... and by case and size, the policy against the best rival."""
     scenes: Mapping[str, GeneratedScenes]
     verdicts: pd.DataFrame
     """One row per verdict of the coarse bound, of both splits."""
@@ -140,6 +144,10 @@ def load_inputs(root: Path) -> Inputs:
         },
         geometry=_optional(geometry, "make bench", shapes.GEOMETRY),
         spread=_optional(spread, "make study", shapes.SPREAD),
+        cases=_optional(root / REPORTS / "cases.json", "make cases", shapes.CASES),
+        cases_compared=_optional(
+            root / REPORTS / "cases_compared.json", "make cases", shapes.COMPARED
+        ),
         scenes=scenes,
         verdicts=_verdicts(root, scenes),
         problems=_problems(root, scenes["test"]),

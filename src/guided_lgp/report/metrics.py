@@ -126,6 +126,32 @@ class Draws(_Figures):
     shortest: Annotated[list[Share], Field(min_length=1)]
 
 
+class CaseFigures(_Figures):
+    """What one planner did on the problems of one size of a case."""
+
+    scenes: Count
+    trainings: Annotated[Count, Field(ge=1)]
+    problems: Annotated[Count, Field(ge=1)]
+    solved: Count
+    solved_min: Count
+    calls_mean: Number | None
+    infeasible_calls_mean: Number | None
+    plan_length_mean: Number | None
+    path_verified_share: Share | None
+    physics_share: Share | None
+
+
+class CaseRatio(_Figures):
+    """The policy's calls as a share of the best rival's, with an interval."""
+
+    rival: str
+    calls: Number
+    rival_calls: Annotated[float, Field(gt=0)]
+    ratio: Number
+    low: Number
+    high: Number
+
+
 _Subset = Literal["all", "unseen"]
 _Subsets = Annotated[dict[_Subset, Shares], Field(min_length=2)]
 
@@ -134,6 +160,10 @@ SCALABILITY = TypeAdapter[Any](dict[str, dict[str, Sizes]])
 TIMING = TypeAdapter[Any](dict[str, dict[str, Times]])
 TRAINING = TypeAdapter[Any](Training)
 GEOMETRY = TypeAdapter[Any](dict[str, Bounds])
+CASES = TypeAdapter[Any](dict[str, dict[str, dict[str, CaseFigures]]])
+COMPARED = TypeAdapter[Any](
+    dict[str, dict[str, dict[Literal["with_facts", "facts_given"], CaseRatio]]]
+)
 SPREAD = TypeAdapter[Any](dict[str, dict[str, dict[_Subset, Draws]]])
 
 

@@ -15,6 +15,7 @@ from guided_lgp.paths import METRICS, REPORTS
 from guided_lgp.policy.split import training_objectives
 from guided_lgp.report import (
     analysis,
+    cases,
     figures,
     panels,
     scalability_figures,
@@ -97,6 +98,7 @@ def _tables(inputs: Inputs, novelty: Mapping[str, str], calls: Mapping[str, floa
     rejected = {name: (len(s.scenes), s.rejected) for name, s in inputs.scenes.items()}
     optional = [tables.geometry(inputs.geometry)] if inputs.geometry is not None else []
     optional += [tables.draws(inputs.spread)] if inputs.spread is not None else []
+    optional += [cases.table(name, sizes) for name, sizes in (inputs.cases or {}).items()]
     return [
         tables.generalization(inputs.generalization, calls),
         tables.unseen(analysis.by_novelty(inputs.problems, novelty), novelty),

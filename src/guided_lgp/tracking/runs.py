@@ -115,7 +115,7 @@ class _Run:
         run = cls(client, parent, child.info.run_id)
         if not replayed:
             run._watch()
-        section = params.model_dump().get(address.partition("@")[0], {})
+        section = _section(address, params)
         _log_params(client, run._id, section)
         return run
 
@@ -190,6 +190,14 @@ class _Run:
             self._monitor.finish()
         self._client.set_terminated(self._id, status)
         self._client.set_terminated(self._parent, status)
+
+
+def _section(address: str, params: Params) -> Mapping[str, Any]:
+    """The parameters of a stage: its own, or those of the case that it belongs to."""
+    stage, _, of = address.rpartition(":")[2].partition("@")
+    values = params.model_dump()
+    own: Mapping[str, Any] = values.get(stage) or values["cases"].get(of.partition("-")[0], {})
+    return own
 
 
 def _create_parent(client: Any, experiment: str, params: Params, execution: str) -> str:

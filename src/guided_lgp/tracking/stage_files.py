@@ -92,7 +92,8 @@ def running_stage(address: str) -> StageFiles:
     from dvc.stage.serialize import to_single_stage_lockfile
 
     with Repo() as repo:
-        stage = repo.stage.load_one(name=address)
+        path, _, name = address.rpartition(":")
+        stage = repo.stage.load_one(path=path or None, name=name)
         stage.save_deps()
         return StageFiles.of(address, to_single_stage_lockfile(stage))
 
