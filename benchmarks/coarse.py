@@ -77,7 +77,7 @@ def run_task(task: Task) -> dict[str, Any]:
     rng = np.random.default_rng([SEED, length])
     sequences: list[Sequence] = []
     for index, scene in enumerate(scenes):
-        usual = CoarseBound(scene, PARAMETERS.bounds.coarse_tries)
+        usual = CoarseBound(scene, PARAMETERS.bounds.coarse_restarts)
         patient = CoarseBound(scene, MANY_TRIES)
         for _ in range(index, count, len(scenes)):
             sequences.append(_judge(_random(scene, length, rng), scene, usual, patient))

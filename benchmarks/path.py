@@ -73,7 +73,7 @@ def run_task(task: Task) -> list[Sample]:
     """Plan and carry out the sequences of a task."""
     rng = np.random.default_rng([SEED, task.length, task.number])
     bounds = load_params(ROOT / PARAMS).bounds
-    coarse = CoarseBound(task.scene, bounds.coarse_tries)
+    coarse = CoarseBound(task.scene, bounds.coarse_restarts)
     path = PathBound(task.scene, coarse, bounds.path_solutions)
     return [_sample(task.length, task.scene, coarse, path, rng) for _ in range(task.count)]
 

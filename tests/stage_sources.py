@@ -94,7 +94,7 @@ _TRAINING = {"patience": 1, "validation_share": 0.4}
 _LIMITS = {"max_depth": 2, "max_tree_size": 10, "max_paths": 1, "max_sequences": 2}
 TINY: Mapping[str, Mapping[str, object]] = {
     "parallel": {"workers": 1},  # in the process that notes
-    "bounds": {"coarse_tries": 1, "path_solutions": 1},
+    "bounds": {"coarse_restarts": 1, "path_solutions": 1},
     "train_policy": _TRAINING | dict.fromkeys(NETWORKS, _NETWORK),
     "train_improved": _TRAINING | dict.fromkeys(NETWORKS, _NETWORK),
     "train_relational": _TRAINING | {"epochs": 1},

@@ -154,13 +154,13 @@ def test_ship_takes_the_weights_and_limits_of_a_clone(tmp_path: Path) -> None:
     shutil.copytree(ROOT / "reports/metrics", clone / "reports/metrics")
     (clone / "models" / "relational.json").write_text("{}")
     params = yaml.safe_load((ROOT / "params.yaml").read_text())
-    params["bounds"]["coarse_tries"] = 5
+    params["bounds"]["coarse_restarts"] = 5
     (clone / "params.yaml").write_text(yaml.safe_dump(params))
     ship(clone, tmp_path / "models", tmp_path / "planning.yaml")
     assert (tmp_path / "models" / "relational.json").read_text() == "{}"
     assert {f.name for f in (tmp_path / "models").iterdir()} == {f.name for f in MODELS.iterdir()}
-    assert load_planning(tmp_path / "planning.yaml").bounds.coarse_tries == 5
-    assert load_planning(PLANNING).bounds.coarse_tries != 5
+    assert load_planning(tmp_path / "planning.yaml").bounds.coarse_restarts == 5
+    assert load_planning(PLANNING).bounds.coarse_restarts != 5
     assert f"{params['generate_scenes']['training_configurations']} random scenes" in (
         (tmp_path / "models" / CARD).read_text()
     )

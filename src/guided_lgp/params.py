@@ -44,7 +44,7 @@ class Parallel(Section):
 class BoundsParams(Section):
     """Limits of the NLP's two bounds."""
 
-    coarse_tries: Annotated[int, Field(strict=True, ge=1, le=1000)]
+    coarse_restarts: Annotated[int, Field(strict=True, ge=1, le=1000)]
     path_solutions: Annotated[int, Field(strict=True, ge=1, le=100)]
 
 

@@ -12,7 +12,7 @@ from guided_lgp.scene import Box, Scene, Table
 from guided_lgp.scene.families import draw_problems, find_family
 from guided_lgp.scene.families.rows import Rows
 
-PARAMS = BoundsParams(coarse_tries=12, path_solutions=1)
+PARAMS = BoundsParams(coarse_restarts=12, path_solutions=1)
 TABLES = (
     Table(name="tab1", position=(0.54, 0.33, 0.6), half_extents=(0.17, 0.25)),
     Table(name="tab2", position=(0.54, -0.33, 0.6), half_extents=(0.17, 0.25)),

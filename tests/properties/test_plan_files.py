@@ -27,7 +27,7 @@ GOALS = ["(on red green)"]
 def written(scene: Scene, folder: Path) -> Path:
     """A plan of two actions, as the command line writes it."""
     params = load_params(Path(__file__).parents[2] / "params.yaml")
-    params = params.model_copy(update={"bounds": BoundsParams(coarse_tries=4, path_solutions=2)})
+    params = params.model_copy(update={"bounds": BoundsParams(coarse_restarts=4, path_solutions=2)})
     result = plan(scene, GOALS, "breadth-first", params=params)
     assert result.path is not None
     path = folder / "written.json"

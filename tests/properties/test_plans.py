@@ -34,7 +34,7 @@ def params() -> Params:
     )
     return load_params(Path(__file__).parents[2] / "params.yaml").model_copy(
         update={
-            "bounds": BoundsParams(coarse_tries=3, path_solutions=1),
+            "bounds": BoundsParams(coarse_restarts=3, path_solutions=1),
             "compare_scalability": limits,
         }
     )

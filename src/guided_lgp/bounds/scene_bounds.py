@@ -41,11 +41,11 @@ class SceneBounds:
         self.scene = scene
         self._goals = GoalTerms.of(objective, scene.symbols.domain)
         self._coarse_bound = CoarseBound(
-            scene, params.coarse_tries, deadline=deadline, goals=self._goals
+            scene, params.coarse_restarts, deadline=deadline, goals=self._goals
         )
         self._path_solutions = params.path_solutions
         self._deadline = deadline
-        self._parts = Parts(scene, _PATIENCE * params.coarse_tries, self.facts, deadline)
+        self._parts = Parts(scene, _PATIENCE * params.coarse_restarts, self.facts, deadline)
         self._pairs = Pairs(scene, self._coarse_bound.solve, self._parts.solve)
         self._coarse: dict[Skeleton, CoarseResult] = {}
         self._path: dict[Skeleton, PathResult] = {}
