@@ -4,7 +4,7 @@ A grip closes on one of the pairs of sides that the hand can take. Below somethi
 goes by a low straight way as well as from above.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,7 +53,7 @@ class Variants:
         return Variant(kept.sides + sides, kept.low + low)
 
 
-def _drawn(generator: np.random.Generator, counts: list[int]) -> tuple[int, ...]:
+def _drawn(generator: np.random.Generator, counts: Sequence[int]) -> tuple[int, ...]:
     return tuple(int(generator.integers(count)) if count > 1 else 0 for count in counts)
 
 
@@ -64,12 +64,15 @@ def _sides(geometry: SceneGeometry, ground: GroundInstruction) -> Iterator[int]:
         yield max(1, len(geometry.grasp_sides(ground.body, arm.fingers.grasp_width)))
 
 
-def _ways(geometry: SceneGeometry, grounds: list[GroundInstruction]) -> Iterator[int]:
+def _ways(geometry: SceneGeometry, grounds: Sequence[GroundInstruction]) -> Iterator[int]:
     """How many straight ways every action's box has."""
+    if not geometry.overhung:
+        yield from [1] * len(grounds)
+        return
     state = geometry.scene.state
     for ground in grounds:
-        below = ground.body if ground.into_hand else ground.parent
-        yield 2 if geometry.overhung and _root(state, below) in geometry.overhung else 1
+        below = _root(state, ground.body if ground.into_hand else ground.parent)
+        yield 2 if below in geometry.overhung else 1
         state = successor(state, ground.action)
 
 
