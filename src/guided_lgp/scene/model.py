@@ -189,12 +189,16 @@ class Scene(Document):
     version: Literal[1, 2] = Field(default=1, exclude_if=lambda version: version == 1)
     """Of the format; nothing depends on it."""
     name: str = "scene"
+    """Of the configuration, in messages and titles."""
     domain: str = Field(default=PAPER, exclude_if=lambda name: name == PAPER)
+    """Whose instructions may be used: a file of declarations, by its name."""
     robot: PlacedRobot = Field(default_factory=PlacedRobot)
     tables: Annotated[tuple[Table, ...], Field(min_length=1)]
+    """Fixed supports."""
     boxes: Annotated[tuple[Box, ...], Field(min_length=1)]
-
+    """Movable bodies, and such that others may stand on."""
     obstacles: tuple[Obstacle, ...] = Field(default=(), exclude_if=lambda obstacles: not obstacles)
+    """Bodies that are neither moved nor stood on."""
 
     def __hash__(self) -> int:
         """Cheap, since measures of scenes are cached; scenes of one name are told apart by ==."""
