@@ -8,6 +8,7 @@ is certified as free needs none.
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -321,9 +322,13 @@ class CollisionChecker:
         joints = np.array([body.parentJoint for body in self._geometry.geometryObjects])
         pairs = joints[:, None] != joints[None, :]
         pairs[-objects:] = pairs[:, -objects:] = True
-        for one, other in map(tuple, disabled):
-            first, second = self._shapes(one), self._shapes(other)
-            pairs[np.ix_(first, second)] = pairs[np.ix_(second, first)] = False
+        named = [
+            (first, second)
+            for one, other in map(tuple, disabled)
+            for first, second in product(self._shapes(one), self._shapes(other))
+        ]
+        first, second = np.array(named, dtype=int).reshape(-1, 2).T
+        pairs[first, second] = pairs[second, first] = False
         return np.asarray(pairs)
 
 
