@@ -8,7 +8,7 @@ INSTALLED := $(VENV)/.installed
 export PATH := $(BIN):$(PATH)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: setup ship quick repro study cases test lint bench mlflow verify-determinism verify-interruption verify-load sources
+.PHONY: setup ship quick repro study cases test lint bench mlflow verify-determinism verify-interruption verify-load verify-hostile sources
 
 setup: $(INSTALLED)
 
@@ -84,6 +84,10 @@ verify-load: setup
 # The sources that the stages of dvc.yaml and studies/dvc.yaml depend on, as they load and read them.
 sources: setup
 	python tests/stage_sources.py
+
+# Spoilt input, kills, races, planted files, full disks, odd environments: half an hour.
+verify-hostile: setup
+	python tests/hostile.py
 
 mlflow: setup
 	guided-lgp mlflow ui

@@ -38,7 +38,7 @@ GROWTH_MB = 20.0
 LIMIT_S = 60.0
 OBJECTIVES = ("(on red green)", "(held blue)", "(on red tab2)", "(held green)")
 
-_PIPELINE = """
+PIPELINE = """
 stages:
   generate_scenes:
     cmd: cp place.json reports/training
@@ -101,7 +101,7 @@ def many_experiments(count: int, folder: Path) -> Database:
     (folder / "reports" / "training").mkdir(parents=True)
     for file in ("reports/training/place.json", "params.yaml"):
         shutil.copy(ROOT / file, folder)
-    (folder / "dvc.yaml").write_text(_PIPELINE)
+    (folder / "dvc.yaml").write_text(PIPELINE)
     (folder / ".dvc").mkdir()
     (folder / ".dvc" / "config").write_text("[core]\n    no_scm = true\n    analytics = false\n")
     with chdir(folder), _environment(MLFLOW_TRACKING_URI=f"sqlite:///{folder / 'mlflow.db'}"):

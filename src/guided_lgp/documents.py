@@ -15,7 +15,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from glob import escape
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import yaml
 
@@ -23,6 +23,7 @@ from guided_lgp.errors import InputError
 
 LARGEST = 2**31
 """Bytes that a document may have: twice those of the scenes of a million configurations."""
+_BLOCK = 2**20
 _SURROGATE = r"\\u[dD][89a-fA-F]"
 STANDARD_OUTPUT = Path("-")
 _UNFINISHED = ".unfinished-"
@@ -45,7 +46,7 @@ def read_json(path: Path, accepted: str = "") -> Any:
     where = str(path)
     try:
         with path.open("rb") as stream:
-            content = stream.read(LARGEST + 1)  # not the file's size: devices and pipes have none
+            content = _beginning(stream)
     except OSError as error:
         raise InputError(where, error.strerror or "cannot be read", accepted) from None
     if len(content) > LARGEST:
@@ -66,6 +67,18 @@ def read_json(path: Path, accepted: str = "") -> Any:
         raise InputError(where, "is nested too deeply", accepted) from None
     except ValueError as error:
         raise InputError(where, f"is not JSON: {error}", accepted) from None
+
+
+def _beginning(stream: BinaryIO) -> bytes:
+    """What is in a stream, or a bit more than a document may have.
+
+    The size of the file does not tell: devices and pipes have none. Neither is all of it asked for
+    at once, for which Python would take as much memory.
+    """
+    content = bytearray()
+    while len(content) <= LARGEST and (block := stream.read(_BLOCK)):
+        content += block
+    return bytes(content)
 
 
 def _finite(text: str) -> float:
@@ -235,6 +248,18 @@ def written_whole(path: Path) -> Iterator[Path]:
             with suppress(OSError):
                 unfinished.unlink(missing_ok=True)
             os.close(descriptor)
+
+
+def copy_whole(source: Path, target: Path) -> None:
+    """Copy all files of a folder into another one, each whole or not at all.
+
+    Raises:
+        InputError: a file cannot be written.
+    """
+    for file in sorted(source.rglob("*")):
+        if file.is_file():
+            with written_whole(target / file.relative_to(source)) as unfinished:
+                shutil.copyfile(file, unfinished)
 
 
 @contextmanager

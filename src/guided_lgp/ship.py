@@ -1,12 +1,11 @@
 """Take the pipeline's trained weights and limits into the package (``make ship``)."""
 
-import shutil
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from guided_lgp.documents import read_json, write_text
+from guided_lgp.documents import copy_whole, read_json, write_text
 from guided_lgp.params import Params, PlanningParams, load_params
 from guided_lgp.paths import METRICS, MODELS, PARAMS, PLANNING, TRAINED
 from guided_lgp.policy.declaration import PolicyDeclaration
@@ -31,7 +30,7 @@ def ship(root: Path, models: Path = MODELS, limits: Path = PLANNING) -> None:
     """
     params = load_params(root / PARAMS)
     metrics = read_json(root / METRICS / "generalization.json", "the output of the pipeline")
-    shutil.copytree(root / TRAINED, models, dirs_exist_ok=True)
+    copy_whole(root / TRAINED, models)
     write_text(models / CARD, model_card(params, metrics))
     planning = params.model_dump(include=set(PlanningParams.model_fields))
     write_text(limits, _HEADING + yaml.safe_dump(planning, sort_keys=True))

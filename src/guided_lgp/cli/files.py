@@ -10,7 +10,7 @@ import typer
 
 from guided_lgp.cli.outputs import destinations
 from guided_lgp.cli.terminal import is_plan
-from guided_lgp.documents import write_text
+from guided_lgp.documents import made_whole, write_text
 from guided_lgp.errors import InputError
 from guided_lgp.paths import EXAMPLES
 
@@ -29,7 +29,8 @@ def examples(
     """
     if folder.exists() and any(folder.iterdir()):
         raise InputError(str(folder), "is not empty", "a new folder")
-    shutil.copytree(EXAMPLES, folder, dirs_exist_ok=True)
+    with made_whole(folder) as copy:
+        shutil.copytree(EXAMPLES, copy)
     for scene in sorted(folder.glob("*.json")):
         typer.echo(scene)
 

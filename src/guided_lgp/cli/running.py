@@ -37,6 +37,8 @@ def run_program(program: Callable[[list[str]], int | None], arguments: Sequence[
         # Who reads has seen enough; what is still buffered goes nowhere, without another error.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(0)
+    except MemoryError as error:
+        _fail(error if debug else WorkerError("out of memory"), 3, debug)
     except Exception as error:
         _fail(error, 3, debug)
     sys.exit(code)

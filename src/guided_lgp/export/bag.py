@@ -6,6 +6,7 @@ from typing import Any
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
+from guided_lgp.documents import made_whole
 from guided_lgp.errors import InputError
 from guided_lgp.export.motion import Motion, Segment
 
@@ -29,18 +30,17 @@ def write_bag(motion: Motion, folder: Path) -> None:
     if folder.exists():
         raise InputError(str(folder), "exists", "a new folder")
     clock = motion.nanoseconds
-    try:
-        with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as bag:
-            for group, joints in motion.groups().items():
-                trajectories = [
-                    (clock[segment.start], _trajectory(motion, segment, joints))
-                    for segment in motion.segments
-                ]
-                _write(bag, f"/{group}/joint_trajectory", trajectories)
-            _write(bag, "/joint_states", [(t, _state(motion, row)) for row, t in enumerate(clock)])
-    except OSError as error:
-        fault = error.strerror or "cannot be written"
-        raise InputError(str(folder), fault, "a new folder in an existing one") from None
+    with (
+        made_whole(folder) as own,
+        Writer(own, version=9, storage_plugin=StoragePlugin.MCAP) as bag,
+    ):
+        for group, joints in motion.groups().items():
+            trajectories = [
+                (clock[segment.start], _trajectory(motion, segment, joints))
+                for segment in motion.segments
+            ]
+            _write(bag, f"/{group}/joint_trajectory", trajectories)
+        _write(bag, "/joint_states", [(t, _state(motion, row)) for row, t in enumerate(clock)])
 
 
 def _write(bag: Writer, topic: str, messages: list[tuple[int, Any]]) -> None:

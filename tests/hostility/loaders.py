@@ -1,0 +1,295 @@
+"""Every reader of a file, with good files to spoil."""
+
+import json
+import shutil
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property, partial
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import yaml
+from outputs import write_outputs
+from own_robot import describe, document, written
+
+from guided_lgp.bounds.plan_file import read_plan, write_plan
+from guided_lgp.documents import read_json, read_yaml
+from guided_lgp.logic import (
+    format_objective,
+    parse_objective,
+    parse_skeleton,
+    two_goal_objectives,
+    validate_objective,
+)
+from guided_lgp.params import Params, load_planning, read_params
+from guided_lgp.paths import EVALUATION, EXAMPLES, METRICS, MODELS, SCENES, SEQUENCES, TRAINING
+from guided_lgp.planning import plan
+from guided_lgp.policy.paper.dataset import Dataset, load_dataset
+from guided_lgp.policy.paper.samples import build_dataset
+from guided_lgp.policy.registry import load_policy
+from guided_lgp.report import analysis, tables
+from guided_lgp.report.inputs import load_inputs
+from guided_lgp.report.scalability_tables import scalability
+from guided_lgp.report.summary import summary
+from guided_lgp.robots.build import read_robot
+from guided_lgp.scene import Scene, generate, load_scene, load_scenes
+from guided_lgp.scene.validate import validate_scene
+from guided_lgp.sequences import SHORTEST, VERDICTS, feasible_sequences, read_shortest
+from guided_lgp.studies.cases import load_study
+from guided_lgp.tables import write_table
+from guided_lgp.tracking.metrics import read_metrics
+from guided_lgp.tracking.stage_files import read_lock
+from hostility import spoiling
+from hostility.spoiling import Spoiler
+
+ROOT = Path(__file__).parents[2]
+
+
+@dataclass(frozen=True)
+class Loader:
+    """A reader, and the good files of which each input spoils one."""
+
+    name: str
+    folder: Path
+    files: tuple[str, ...]
+    read: Callable[[Path], object]
+    """Is given the folder."""
+    share: float = 1.0
+    """How many inputs it gets, against others: slow readers get fewer."""
+
+    def attempt(self, seed: int, number: int) -> object:
+        """Spoil a file, read, and put the good file back."""
+        rng = np.random.default_rng(np.random.SeedSequence([seed, number]))
+        file = self.folder / spoiling.pick(rng, self.files)
+        good = file.read_bytes()
+        file.write_bytes(spoiler(file)(good, rng))
+        try:
+            return self.read(self.folder)
+        finally:
+            file.write_bytes(good)
+
+
+def spoiler(file: Path) -> Spoiler:
+    """How a file is spoilt, by its suffix."""
+    kinds = {
+        ".json": spoiling.json_file,
+        ".yaml": spoiling.yaml_file,
+        ".lock": spoiling.yaml_file,
+        ".safetensors": spoiling.tensor_file,
+        ".parquet": spoiling.table_file,
+        ".urdf": spoiling.xml_file,
+        ".srdf": spoiling.xml_file,
+        ".txt": spoiling.words,
+    }
+    return kinds[file.suffix]
+
+
+class Examples:
+    """Good files of every kind, made in a folder when they are needed."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def _new(self, name: str) -> Path:
+        folder = self._folder / name
+        folder.mkdir(parents=True)
+        return folder
+
+    @cached_property
+    def scenes(self) -> Path:
+        """The example scenes, and a plan."""
+        folder = self._new("scenes")
+        for file in EXAMPLES.glob("*.json"):
+            shutil.copy(file, folder)
+        start = load_scene(folder / "three_boxes.json")
+        found = plan(start, ["(on red green)"])
+        assert found.path is not None
+        objective = parse_objective(["(on red green)"])
+        write_plan(folder / "plan.json", start, objective, found.path, {"planner": "guided"})
+        (folder / "goal.txt").write_text("(on red green)")
+        return folder
+
+    @cached_property
+    def parameters(self) -> Path:
+        """The parameters of the pipeline, of planning and of the studies."""
+        folder = self._new("parameters")
+        (folder / "studies").mkdir()
+        for name in ("params.yaml", "studies/params.yaml", "dvc.lock"):
+            shutil.copy(ROOT / name, folder / name)
+        params = yaml.safe_load((folder / "params.yaml").read_text())
+        planning = {name: params[name] for name in ("bounds", "compare_scalability")}
+        (folder / "planning.yaml").write_text(yaml.safe_dump(planning))
+        return folder
+
+    @cached_property
+    def robot(self) -> Path:
+        """A small robot with its description."""
+        folder = self._new("robot")
+        describe(folder, "left_", "right_")
+        written(folder, document("left_", "right_"))
+        return folder
+
+    @cached_property
+    def models(self) -> Path:
+        """The shipped weights."""
+        return Path(shutil.copytree(MODELS, self._folder / "models"))
+
+    @cached_property
+    def outputs(self) -> Path:
+        """What all stages write, with made-up figures; and a data set."""
+        folder = self._new("outputs")
+        write_outputs(folder)
+        return folder
+
+    @cached_property
+    def sequences(self) -> Path:
+        """Scenes, the tables of their enumeration as if one action were feasible, a data set."""
+        folder = self._new("sequences")
+        generate("a", 2, 1, "scene").save(folder / "scenes.json")
+        scenes = load_scenes(folder / "scenes.json").scenes
+        grasps = [(s, box.name) for s in scenes for box in s.boxes]
+        verdicts = [_verdict(scene, box) for scene, box in grasps]
+        shortest = [
+            {"configuration": scene.name, "objective": format_objective(pair), "length": 1}
+            for scene in scenes
+            for pair in two_goal_objectives(scene.symbols)
+        ]
+        write_table(folder / "verdicts.parquet", pa.Table.from_pylist(verdicts, schema=VERDICTS))
+        write_table(folder / "shortest.parquet", pa.Table.from_pylist(shortest, schema=SHORTEST))
+        _built(folder).save(folder / "dataset")
+        return folder
+
+
+def _verdict(scene: Scene, box: str) -> dict[str, object]:
+    return {
+        "configuration": scene.name,
+        "skeleton": f"(grasp pr2L {box})",
+        "length": 1,
+        "feasible": box != "blue",
+        "failure_constraint": "reach" if box == "blue" else None,
+        "states": [0.1 * step for step in range(42)] if box != "blue" else None,
+    }
+
+
+def loaders(folder: Path) -> tuple[Loader, ...]:
+    """All of them, with good files below a folder."""
+    examples = Examples(folder)
+    return (*_documents(examples), *_arrays(examples), *_stage_files(examples))
+
+
+def _documents(examples: Examples) -> Iterator[Loader]:
+    scenes = tuple(file.name for file in sorted(examples.scenes.glob("*.json")))
+    scenes = tuple(name for name in scenes if name != "plan.json")
+    for name in scenes:
+        read = partial(_validated_scene, name=name)
+        yield Loader(f"scene {name}", examples.scenes, (name,), read, 2 / len(scenes))
+    yield Loader("plan", examples.scenes, ("plan.json",), lambda f: read_plan(f / "plan.json"), 0.3)
+    yield Loader("goal", examples.scenes, ("goal.txt",), _goal)
+    yield Loader("JSON", examples.scenes, scenes, lambda f: [read_json(f / n) for n in scenes])
+    folder = examples.parameters
+    yield Loader("YAML", folder, ("params.yaml",), lambda f: read_yaml(f / "params.yaml"))
+    yield Loader(
+        "parameters", folder, ("params.yaml",), lambda f: read_params(f / "params.yaml", Params)
+    )
+    yield Loader("limits", folder, ("planning.yaml",), lambda f: load_planning(f / "planning.yaml"))
+    yield Loader("studies", folder, ("params.yaml", "studies/params.yaml"), load_study)
+    robot = ("own.yaml", "own_description/own.urdf", "own_description/own.srdf")
+    yield Loader("robot file", examples.robot, robot[:1], lambda f: read_robot(f / "own.yaml"), 0.5)
+    yield Loader(
+        "description", examples.robot, robot[1:], lambda f: read_robot(f / "own.yaml"), 0.5
+    )
+
+
+def _validated_scene(folder: Path, name: str) -> object:
+    scene = load_scene(folder / name)
+    validate_scene(scene, str(folder / name))
+    return scene
+
+
+def _goal(folder: Path) -> object:
+    scene = load_scene(folder / "three_boxes.json")
+    text = (folder / "goal.txt").read_bytes().decode("utf-8", "surrogateescape")
+    objective = parse_objective([text])
+    validate_objective(objective, scene.symbols, scene.state)
+    return parse_skeleton(text)
+
+
+def _arrays(examples: Examples) -> Iterator[Loader]:
+    for policy in ("paper", "improved", "relational"):
+        prefix = "improved/" if policy == "improved" else ""
+        names = ("relational",) if policy == "relational" else ("instruction", "grasp", "place")
+        files = tuple(f"{prefix}{name}.{end}" for name in names for end in ("json", "safetensors"))
+        yield Loader(f"policy {policy}", examples.models, files, partial(load_policy, policy))
+
+
+def _stage_files(examples: Examples) -> Iterator[Loader]:
+    folder = examples.outputs
+    test = SCENES / "test.json"
+    yield Loader("scenes", folder, (str(test),), lambda f: load_scenes(f / test))
+    folder = examples.sequences
+    tables = ("verdicts.parquet", "shortest.parquet")
+    yield Loader("sequences", folder, tables, _sequences)
+    yield Loader("samples of sequences", folder, tables, _built, 0.5)
+    files = ("dataset/dataset.json", "dataset/samples.safetensors")
+    yield Loader("data set", folder, files, lambda f: load_dataset(f / "dataset"))
+    yield Loader("data set, digest right", folder, files[1:], _with_its_digest)
+    yield Loader("curves", examples.outputs, (str(TRAINING / "place.json"),), _curves)
+    folder = examples.outputs
+    files = tuple(
+        sorted(
+            str(file.relative_to(folder))
+            for part in (METRICS, EVALUATION, SEQUENCES, TRAINING)
+            for file in (folder / part).rglob("*")
+            if file.is_file()
+        )
+    )
+    yield Loader("report", folder, files, _report, 0.2)
+    lock = ("dvc.lock",)
+    yield Loader("dvc.lock", examples.parameters, lock, lambda f: read_lock(f / "dvc.lock"), 0.2)
+
+
+def _sequences(folder: Path) -> object:
+    scenes = load_scenes(folder / "scenes.json").scenes
+    objectives = two_goal_objectives(scenes[0].symbols)[:5]
+    read_shortest(folder / "shortest.parquet", scenes, objectives)
+    return feasible_sequences(folder / "verdicts.parquet", scenes)
+
+
+def _built(folder: Path) -> Dataset:
+    scenes = load_scenes(folder / "scenes.json").scenes
+    objectives = two_goal_objectives(scenes[0].symbols)[:5]
+    verdicts, shortest = folder / "verdicts.parquet", folder / "shortest.parquet"
+    return build_dataset(scenes, verdicts, shortest, objectives, 0)
+
+
+def _with_its_digest(folder: Path) -> object:
+    """Read samples whose digest in the description is the one of the spoilt file."""
+    file = folder / "dataset" / "dataset.json"
+    good = file.read_text()
+    digest = sha256((folder / "dataset" / "samples.safetensors").read_bytes()).hexdigest()
+    file.write_text(json.dumps(json.loads(good) | {"digest": digest}))
+    try:
+        return load_dataset(folder / "dataset")
+    finally:
+        file.write_text(good)
+
+
+def _curves(folder: Path) -> object:
+    return read_metrics(folder / TRAINING / "place.json")
+
+
+def _report(folder: Path) -> object:
+    inputs = load_inputs(folder)
+    novelty = dict.fromkeys(inputs.problems["objective"], "new")
+    return (
+        summary(inputs),
+        tables.training_metrics(inputs.training),
+        tables.generalization(inputs.generalization, analysis.calls_per_action(inputs.problems)),
+        tables.unseen(analysis.by_novelty(inputs.problems, novelty), novelty),
+        scalability(inputs.scalability, inputs.timing),
+        tables.training(inputs.training),
+        analysis.by_length(inputs.verdicts),
+        analysis.failures(inputs.verdicts, inputs.configurations),
+    )

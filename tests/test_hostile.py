@@ -1,0 +1,175 @@
+"""`make verify-hostile` in small: 500 inputs, and a control for each of its detectors."""
+
+import ctypes
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from guided_lgp.documents import write_text
+from guided_lgp.errors import InputError
+from hostile import SEED, inputs, startup_ms
+from hostility import environments, judge, kills, limits, planted, races
+from hostility.kills import Writer
+
+
+def test_five_hundred_inputs_end_well(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    found, _ = inputs(tmp_path, SEED + 1, 460, 40)
+    assert found.faults == []
+    figures = found.figures()
+    assert figures["tried"] >= 490
+    assert min(figures["accepted"], figures["refused"]) > 0
+
+
+def unknown_name(number: int) -> object:
+    return {}[number]
+
+
+def endless(number: int) -> None:
+    while True:
+        pass
+
+
+def deaf(number: int) -> None:
+    time.sleep(60)
+
+
+def refuses_in_two_screens(number: int) -> None:
+    raise InputError("x" * 5000, "is wrong")
+
+
+@pytest.mark.parametrize(
+    ("attempt", "outcome"),
+    [
+        (unknown_name, "foreign"),
+        (lambda number: os.abort(), "foreign"),
+        (lambda number: os._exit(0), "foreign"),
+        (refuses_in_two_screens, "foreign"),
+        (endless, "slow"),
+        (deaf, "slow"),
+    ],
+    ids=["an exception", "a signal", "an end", "a long line", "a loop", "a hang"],
+)
+def test_the_judge_sees(
+    attempt: Callable[[int], object], outcome: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(judge, "LIMIT_S", 0.2)
+    monkeypatch.setattr(judge, "HANG_S", 2.0)
+    found = judge.judge(lambda number: None if number == 1 else attempt(number), range(2))
+    assert found.counts == {outcome: 1, "accepted": 1}
+    assert len(found.faults) == 1
+
+
+def in_place(folder: Path, version: int) -> None:
+    """Writes the file itself, with an unfinished one beside it for show."""
+    unfinished, file = folder / ".unfinished-a", folder / "a"
+    unfinished.unlink(missing_ok=True)
+    descriptor = os.open(unfinished, os.O_CREAT | os.O_EXCL | os.O_RDWR)
+    file.write_text(f"{version}" * 500)
+    os.fsync(descriptor)
+    file.write_text(f"{version}" * 1000)
+    unfinished.unlink()
+    os.close(descriptor)
+
+
+def grows(folder: Path, version: int) -> None:
+    """Writes whole files, and others than before the kill."""
+    write_text(folder / f"{len(list(folder.iterdir()))}", f"{version}" * 100)
+
+
+@pytest.mark.parametrize("work", [in_place, grows])
+def test_kills_show_a_writer_that_is_none(
+    work: Callable[[Path, int], object], tmp_path: Path
+) -> None:
+    figures = kills.Figures()
+    Writer("naive", work).kill_everywhere(tmp_path, figures)
+    assert figures.inside_window >= 3
+    assert figures.damaged > 0
+
+
+def test_kills_do_not_harm_a_writer(tmp_path: Path) -> None:
+    figures = kills.Figures()
+    writer = Writer("text", lambda at, n: write_text(at / "a.txt", f"{n}" * 1000))
+    writer.kill_everywhere(tmp_path, figures)
+    assert figures.inside_window == 2 * len(kills.MOMENTS)
+    assert figures.faults == []
+
+
+def test_races_show_torn_reads(tmp_path: Path) -> None:
+    figures = races.Figures()
+    races.write_at_once(tmp_path, figures, 300, write=Path.write_text)
+    assert figures.torn > 0
+
+
+def test_races_show_what_is_lost(tmp_path: Path) -> None:
+    figures = races.Figures()
+    races.write_at_once(tmp_path, figures, 1, write=lambda file, _: write_text(file, "0" * 5000))
+    assert figures.lost == 1
+
+
+def test_writers_at_once_tear_nothing(tmp_path: Path) -> None:
+    figures = races.Figures()
+    races.write_at_once(tmp_path, figures, 50)
+    assert figures == races.Figures(runs=4)
+
+
+def trusting(place: planted.Place) -> Callable[[], None]:
+    """Opens the library that lies in the cache."""
+    return lambda: ctypes.CDLL(str(next(place.cache.glob("seven-*.so")))) and None
+
+
+def test_planted_code_shows_where_it_is_run(tmp_path: Path) -> None:
+    place = planted.Place(tmp_path / "a")
+    assert planted.is_effective(place.folder, planted.another_library, trusting(place))
+
+
+def test_planted_links_show_where_they_are_followed(tmp_path: Path) -> None:
+    def naive(place: planted.Place) -> None:
+        (place.folder / "target").symlink_to(place.precious)
+        (place.folder / "target").write_text("new")
+
+    assert planted.act_is_effective(tmp_path / "a", naive)
+
+
+def test_nothing_planted_is_effective(tmp_path: Path) -> None:
+    for plant in planted.PLANTS:
+        assert not planted.is_effective(tmp_path / plant.__name__, plant)
+    for act in set(planted.ACTS) - {planted.planted_package}:  # which compiles for half a minute
+        assert not planted.act_is_effective(tmp_path / act.__name__, act)
+
+
+def test_a_full_disk_shows_a_writer_in_place(tmp_path: Path) -> None:
+    def naive(folder: Path, version: int) -> None:
+        (folder / "a").write_text("a" * (1 + version * 50_000))
+
+    def whole(folder: Path, version: int) -> None:
+        write_text(folder / "a", "a" * (1 + version * 50_000))
+
+    found = []
+    for write in (naive, whole):
+        figures = limits.Figures()
+        limits.write_on_full_disks([Writer("one", write)], tmp_path / write.__name__, figures)
+        assert figures.tried == 3
+        found.append((figures.torn > 0, figures.foreign > 0))
+    assert found == [(True, True), (False, False)]
+
+
+def test_an_environment_that_matters_shows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    code = "import os, pathlib as p; p.Path('data').mkdir(); p.Path('data/a').write_text({})"
+    figures = environments.Figures()
+    for index, text in enumerate(("'a'", "str(os.environ.get('HOME'))")):
+        monkeypatch.setattr(environments, "WORK", code.format(text))
+        first, second = (
+            environments.digests(environment, tmp_path / f"{index}{n}", tmp_path / "none")
+            for n, environment in enumerate(
+                (environments.Environment("ordinary"), environments.ENVIRONMENTS[0])
+            )
+        )
+        environments.compare(first, second, "no HOME", figures)
+    assert (figures.tried, figures.different) == (2, 1)
+
+
+def test_the_checks_at_the_start_cost_little() -> None:
+    assert startup_ms() <= 10
