@@ -13,6 +13,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from guided_lgp.bounds.program.kernels import SCALE
 from guided_lgp.bounds.results import Array
 from guided_lgp.poses import rotation_matrix
 from guided_lgp.robots import Arm, Robot
@@ -225,6 +226,17 @@ def _mounting(robot: Robot) -> tuple[Joint, ...]:
         return ()
     link = robot.base_link
     return (Joint("", "fixed", "", link, robot.mounting, np.zeros(3), np.zeros(3)),)
+
+
+@cache
+def levers(chain: Chain, closed: float) -> tuple[float, ...]:
+    """How much the scaled distance of a sphere changes at most per rad of each moving joint.
+
+    Args:
+        chain: with the spheres.
+        closed: how far (m) the fingers, and their spheres, are from wide open.
+    """
+    return tuple(SCALE * (lever + closed) for lever in chain.levers)
 
 
 def _exact(values: Array) -> Any:

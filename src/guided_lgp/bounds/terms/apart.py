@@ -6,7 +6,7 @@ import casadi as ca
 
 from guided_lgp.bounds.program.context import Context
 from guided_lgp.bounds.program.kernels import SCALE, Kernel, distance, kernel
-from guided_lgp.bounds.program.kinematics import Chain, RobotKinematics
+from guided_lgp.bounds.program.kinematics import Chain, RobotKinematics, levers
 from guided_lgp.bounds.terms.term import Term
 
 
@@ -52,11 +52,7 @@ def keep_apart(
         ),
         ("apart", gripper, other),
         tuple(one.links[i] for i in one.chain.against_arms for _ in range(count)),
-        tuple(
-            SCALE * (lever + context.closed(hand))
-            for hand, arm in ((gripper, one), (other, two))
-            for lever in arm.chain.levers
-        ),
+        (*levers(one.chain, context.closed(gripper)), *levers(two.chain, context.closed(other))),
     )
 
 

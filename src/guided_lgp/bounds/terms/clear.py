@@ -6,7 +6,7 @@ import casadi as ca
 
 from guided_lgp.bounds.program.context import Context
 from guided_lgp.bounds.program.kernels import SCALE, Kernel, distance, in_frame, kernel
-from guided_lgp.bounds.program.kinematics import Chain, RobotKinematics
+from guided_lgp.bounds.program.kinematics import Chain, RobotKinematics, levers
 from guided_lgp.bounds.terms.term import Term
 
 
@@ -35,7 +35,7 @@ def keep_clear(context: Context, gripper: str, joints: tuple[int, ...], body: st
     """Of one configuration of an arm."""
     arm, pose = context.robot.arms[gripper], context.pose[body]
     half, closed = context.half(body), context.closed(gripper)
-    ways = (*(lever + closed for lever in arm.chain.levers), 1.0, 1.0, hypot(*half[:2]), 1.0)
+    turns = SCALE * hypot(*half[:2])
     context.rows(
         f"clear_{arm.chain.name}",
         (*joints, *pose.plane, pose.z),
@@ -48,7 +48,7 @@ def keep_clear(context: Context, gripper: str, joints: tuple[int, ...], body: st
         ),
         ("clear", gripper, body),
         arm.links,
-        tuple(SCALE * way for way in ways),
+        (*levers(arm.chain, closed), SCALE, SCALE, turns, SCALE),
     )
 
 
