@@ -211,7 +211,7 @@ class Case(Section):
     seeds: Annotated[tuple[Seed, ...], Field(min_length=1)]
     """One training each."""
     controls: tuple[str, ...] = ()
-    """Further policies, with less to see or with shuffled labels, each trained as often."""
+    """Further policies, with less to see or with shuffled labels, trained with the first seed."""
     evaluation: Evaluation
     limits: SearchLimits
 

@@ -14,7 +14,7 @@ from guided_lgp.bounds.execution import execute
 from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.cases.declared import DeclaredCase, declared_case
 from guided_lgp.cases.demonstrate import CoarseBounds
-from guided_lgp.cases.policies import FULL, RIVALS, models_of
+from guided_lgp.cases.policies import RIVALS, models_of, trained_with
 from guided_lgp.cases.shards import run_kept
 from guided_lgp.documents import write_json
 from guided_lgp.logic import format_objective, format_skeleton
@@ -77,7 +77,7 @@ def run(params: Params, root: Path, name: str, training: str) -> None:
 def _tasks(case: DeclaredCase, params: Params, root: Path, training: str) -> Iterator[Task]:
     policies = {}
     if training != RIVALS:
-        for policy in (FULL, *case.params.controls):
+        for policy in trained_with(case.params, int(training)):
             policies[policy] = models_of(root, case.name, policy, int(training))
     first = training == str(case.params.seeds[0])
     for size in case.params.evaluation.sizes:
@@ -108,7 +108,7 @@ def compare(task: Task) -> list[Row]:
         _row(task, planner, policy, bounds)
         for planner in CASE_PLANNERS.values()
         if (policy := _policy(planner, loaded)) is not None or not planner.policy
-        if planner.trained == bool(task.policies)
+        if planner.trained == bool(loaded)
     ]
 
 

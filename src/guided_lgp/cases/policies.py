@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from pathlib import Path
 
+from guided_lgp.params import Case
 from guided_lgp.paths import TRAINED
 from guided_lgp.policy.relational.geometry import EVERYTHING, RELATIVE, SIZES, Sight
 
@@ -17,6 +18,11 @@ SIGHTS: Mapping[str, Sight] = {
     SHUFFLED: EVERYTHING,
 }
 """What each sees: the one that counts, then the controls."""
+
+
+def trained_with(case: Case, seed: int) -> tuple[str, ...]:
+    """The policies of one training: the full one, and with the first seed the controls, too."""
+    return (FULL, *(case.controls if seed == case.seeds[0] else ()))
 
 
 def demonstrations_of(root: Path, case: str) -> Path:

@@ -7,7 +7,13 @@ from pathlib import Path
 import numpy as np
 
 from guided_lgp import parallel
-from guided_lgp.cases.policies import FULL, SHUFFLED, SIGHTS, demonstrations_of, models_of
+from guided_lgp.cases.policies import (
+    SHUFFLED,
+    SIGHTS,
+    demonstrations_of,
+    models_of,
+    trained_with,
+)
 from guided_lgp.domains import load_domain
 from guided_lgp.logic import Domain
 from guided_lgp.params import Params, TrainRelational
@@ -39,7 +45,7 @@ def run(params: Params, root: Path, name: str, seed: int) -> None:
     settings = case.training.model_copy(update={"seed": seed})
     tasks = [
         Training(examples, policy, settings, models_of(root, name, policy, seed))
-        for policy in (FULL, *case.controls)
+        for policy in trained_with(case, seed)
     ]
     parallel.run(train, tasks, params.parallel, f"{name}: training {seed}")
 

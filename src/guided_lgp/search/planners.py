@@ -231,7 +231,6 @@ CASE_PLANNERS: Mapping[str, Planner] = {
             label="Relational best-first",
             search="discrepancy",
             policy="full",
-            carried_out=True,
         ),
         Planner(
             name="relational_informed",
