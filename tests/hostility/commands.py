@@ -24,17 +24,24 @@ COMMANDS: tuple[tuple[str, ...], ...] = (
     (*_PLAN, "--planner", "guided", "--policy", "relational", "--max-nodes", "50"),
     (*_PLAN, "--goal", "(held blue)", "--out", "new.json", "--json"),
     (*_PLAN, "--params", "planning.yaml", "--html", "new.html", "--models", "models"),
+    (*_PLAN, "--domain", "pick_and_place", "--skeleton", "(grasp pr2L red)", "--candidates", "2"),
     ("pddl", "three_boxes.json", "--goal", "(on red green)", "--folder", "new"),
     ("export", "plan.json", "new.csv", "--speed", "0.5"),
     ("export", "plan.json", "new.json"),
     ("view", "plan.json", "--port", "8081"),
     ("view", "three_boxes.json"),
+    ("view", "plan.json", "--rerun", "new.rrd"),
+    *((stage, "--case", "rows") for stage in ("demonstrate", "replay_case")),
+    ("train_case", "--case", "rows", "--seed", "1", "--timeout", "60"),
+    ("evaluate_case", "--case", "rows", "--training", "rivals"),
     ("schema", "scene"),
     ("examples", "new"),
     ("mlflow", "ui", "--port", "5001"),
     *((stage, "--params", "params.yaml", "--timeout", "60") for stage in cli.STAGES),
     *((f"train_{kind}", "place", "--params", "params.yaml") for kind in ("policy", "improved")),
 )
+_CASES = ("collect", "demonstrate", "evaluate", "replay", "train")
+"""The modules of their stages."""
 _END = {"plan": ("--timeout", "0.2")}
 """Added to a command whatever its words are: good input may take as long as it likes."""
 _WORDS = ("--goal", "--json", "--help", "-h", "--", "-", "--out", "--timeout", "plan")
@@ -124,7 +131,9 @@ def _as_argument(word: str) -> str:
 @contextmanager
 def _harmless() -> Iterator[None]:
     """No server is started, no stage computes, nothing is recorded."""
-    runs = [patch.object(import_module(name), "run", Mock()) for name in cli.STAGES.values()]
+    cases = (f"guided_lgp.cases.{name}" for name in _CASES)
+    modules = map(import_module, (*cli.STAGES.values(), *cases))
+    runs = [patch.object(module, "run", Mock()) for module in modules]
     view = patch.object(import_module("guided_lgp.view.live"), "view", Mock())
     others = (
         patch.object(tracking, "recorded", lambda *_: nullcontext()),

@@ -21,8 +21,8 @@ from guided_lgp.logic import (
     parse_objective,
     parse_skeleton,
     two_goal_objectives,
-    validate_objective,
 )
+from guided_lgp.logic.objectives import check_objective
 from guided_lgp.params import Params, load_planning, read_params
 from guided_lgp.paths import EVALUATION, EXAMPLES, METRICS, MODELS, SCENES, SEQUENCES, TRAINING
 from guided_lgp.planning import plan
@@ -35,6 +35,7 @@ from guided_lgp.report.scalability_tables import scalability
 from guided_lgp.report.summary import summary
 from guided_lgp.robots.build import read_robot
 from guided_lgp.scene import Scene, generate, load_scene, load_scenes
+from guided_lgp.scene.goals import complete_objective
 from guided_lgp.scene.validate import validate_scene
 from guided_lgp.sequences import SHORTEST, VERDICTS, feasible_sequences, read_shortest
 from guided_lgp.studies.cases import load_study
@@ -45,6 +46,17 @@ from hostility import spoiling
 from hostility.spoiling import Spoiler
 
 ROOT = Path(__file__).parents[2]
+GOALS = (
+    "(on red green)",
+    "(held blue)",
+    "(held blue pr2L)",
+    "(empty pr2R)",
+    "(handempty)",
+    "(at red 0.5 0.3 0.65 0.2 0.01 0.05)",
+    "(at red tab1 0.5 0.3 0.65 0.2)",
+    "(in red tab1 -0.1 -0.1 0.1 0.1)",
+    "(upright red)",
+)
 
 
 @dataclass(frozen=True)
@@ -82,6 +94,7 @@ def spoiler(file: Path) -> Spoiler:
         ".urdf": spoiling.xml_file,
         ".srdf": spoiling.xml_file,
         ".txt": spoiling.words,
+        ".obj": spoiling.text,
     }
     return kinds[file.suffix]
 
@@ -108,7 +121,9 @@ class Examples:
         assert found.path is not None
         objective = parse_objective(["(on red green)"])
         write_plan(folder / "plan.json", start, objective, found.path, {"planner": "guided"})
-        (folder / "goal.txt").write_text("(on red green)")
+        _write_whole_scene(folder)
+        for number, goal in enumerate(GOALS):
+            (folder / f"goal{number}.txt").write_text(goal)
         return folder
 
     @cached_property
@@ -162,6 +177,22 @@ class Examples:
         return folder
 
 
+def _write_whole_scene(folder: Path) -> None:
+    """A scene with every field that there is, and the file of a mesh."""
+    scene = json.loads((folder / "kitchen.json").read_text())
+    scene |= {"domain": "pick_and_place"}
+    scene["robot"] |= {"height": 0.0, "tilt": [0.0, 0.0], "joints": {"r_shoulder_pan_joint": -1.0}}
+    tile = {"name": "tile", "size": [0.02, 0.06, 0.1], "position": [0.62, 0.22, 0.61]}
+    turned = [0.0, 0.7071068, 0.0, 0.7071068]
+    scene["boxes"].append(tile | {"quaternion": turned, "on": "counter", "colour": "#aa0000"})
+    wedge = next(box for box in scene["boxes"] if box["name"] == "wedge")
+    corners = wedge.pop("vertices")
+    lines = [f"v {x} {y} {z}" for x, y, z in corners] + ["f 1 2 3", "f 5 6 7"]
+    (folder / "wedge.obj").write_text("\n".join(lines) + "\n")
+    wedge["mesh"] = "wedge.obj"
+    (folder / "whole.json").write_text(json.dumps(scene))
+
+
 def _verdict(scene: Scene, box: str) -> dict[str, object]:
     return {
         "configuration": scene.name,
@@ -186,7 +217,11 @@ def _documents(examples: Examples) -> Iterator[Loader]:
         read = partial(_validated_scene, name=name)
         yield Loader(f"scene {name}", examples.scenes, (name,), read, 2 / len(scenes))
     yield Loader("plan", examples.scenes, ("plan.json",), lambda f: read_plan(f / "plan.json"), 0.3)
-    yield Loader("goal", examples.scenes, ("goal.txt",), _goal)
+    yield Loader(
+        "mesh", examples.scenes, ("wedge.obj",), partial(_validated_scene, name="whole.json")
+    )
+    goals = tuple(f"goal{number}.txt" for number in range(len(GOALS)))
+    yield Loader("goal", examples.scenes, goals, partial(_objective, names=goals))
     yield Loader("JSON", examples.scenes, scenes, lambda f: [read_json(f / n) for n in scenes])
     folder = examples.parameters
     yield Loader("YAML", folder, ("params.yaml",), lambda f: read_yaml(f / "params.yaml"))
@@ -208,12 +243,14 @@ def _validated_scene(folder: Path, name: str) -> object:
     return scene
 
 
-def _goal(folder: Path) -> object:
+def _objective(folder: Path, names: tuple[str, ...]) -> object:
     scene = load_scene(folder / "three_boxes.json")
-    text = (folder / "goal.txt").read_bytes().decode("utf-8", "surrogateescape")
-    objective = parse_objective([text])
-    validate_objective(objective, scene.symbols, scene.state)
-    return parse_skeleton(text)
+    texts = [(folder / name).read_bytes().decode("utf-8", "surrogateescape") for name in names]
+    pairs = zip(texts, GOALS, strict=True)
+    spoilt = next((text for text, goal in pairs if text != goal), GOALS[0])
+    goals = complete_objective(parse_objective([spoilt]), scene)
+    check_objective(goals, scene.symbols)
+    return parse_skeleton(spoilt)
 
 
 def _arrays(examples: Examples) -> Iterator[Loader]:

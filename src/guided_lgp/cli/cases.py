@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from guided_lgp.cli.alone import alone
+from guided_lgp.cli.running import within
 from guided_lgp.cli.stages import end_with_dvc
-from guided_lgp.cli.terminal import ParamsFile
+from guided_lgp.cli.terminal import ParamsFile, TimeLimit
 from guided_lgp.paths import PARAMS
 
 if TYPE_CHECKING:
@@ -23,14 +24,14 @@ CaseName = Annotated[str, typer.Option("--case", help="A case of params.yaml.")]
 
 
 @app.command("demonstrate")
-def demonstrate(case: CaseName, params: ParamsFile = PARAMS) -> None:
+def demonstrate(case: CaseName, params: ParamsFile = PARAMS, timeout: TimeLimit = None) -> None:
     """Find demonstrations of a case by search. Writes data/CASE.
 
     Example: guided-lgp demonstrate --case rows
     """
     from guided_lgp.cases import demonstrate
 
-    _run("demonstrate", case, lambda root, read: demonstrate.run(read, root, case), params)
+    _run("demonstrate", case, lambda root, read: demonstrate.run(read, root, case), params, timeout)
 
 
 @app.command("train_case")
@@ -38,6 +39,7 @@ def train_case(
     case: CaseName,
     seed: Annotated[int, typer.Option(help="Of the training.")],
     params: ParamsFile = PARAMS,
+    timeout: TimeLimit = None,
 ) -> None:
     """Train the policies of a case once. Writes models/CASE.
 
@@ -45,7 +47,13 @@ def train_case(
     """
     from guided_lgp.cases import train
 
-    _run(f"train_case@{seed}", case, lambda root, read: train.run(read, root, case, seed), params)
+    _run(
+        f"train_case@{seed}",
+        case,
+        lambda root, read: train.run(read, root, case, seed),
+        params,
+        timeout,
+    )
 
 
 @app.command("evaluate_case")
@@ -53,6 +61,7 @@ def evaluate_case(
     case: CaseName,
     training: Annotated[str, typer.Option(help="Seed of one, or: rivals.")],
     params: ParamsFile = PARAMS,
+    timeout: TimeLimit = None,
 ) -> None:
     """Plan the test problems of a case. Writes reports/CASE.
 
@@ -65,18 +74,19 @@ def evaluate_case(
         case,
         lambda root, read: evaluate.run(read, root, case, training),
         params,
+        timeout,
     )
 
 
 @app.command("replay_case")
-def replay_case(case: CaseName, params: ParamsFile = PARAMS) -> None:
+def replay_case(case: CaseName, params: ParamsFile = PARAMS, timeout: TimeLimit = None) -> None:
     """Draw the longest plan of a case as a 3D page. Writes reports/CASE/replay.html.
 
     Example: guided-lgp replay_case --case rows
     """
     from guided_lgp.cases import replay
 
-    _run("replay_case", case, lambda root, read: replay.run(read, root, case), params)
+    _run("replay_case", case, lambda root, read: replay.run(read, root, case), params, timeout)
 
 
 @app.command("collect_cases")
@@ -92,7 +102,13 @@ def collect_cases(params: ParamsFile = PARAMS) -> None:
     collect.run(load_params(params), Path.cwd())
 
 
-def _run(stage: str, case: str, work: "Callable[[Path, Params], None]", params_file: Path) -> None:
+def _run(
+    stage: str,
+    case: str,
+    work: "Callable[[Path, Params], None]",
+    params_file: Path,
+    timeout: float | None,
+) -> None:
     """Check the parameters and the case, then run a stage, and record it."""
     from guided_lgp import tracking
     from guided_lgp.cases.declared import declared_case
@@ -103,5 +119,5 @@ def _run(stage: str, case: str, work: "Callable[[Path, Params], None]", params_f
     declared_case(params, case)
     name, _, training = stage.partition("@")
     address = f"{FILE}:{name}@{'-'.join(filter(None, (case, training)))}"
-    with alone(root, address), tracking.recorded(address, params):
+    with within(timeout, address), alone(root, address), tracking.recorded(address, params):
         work(root, params)
