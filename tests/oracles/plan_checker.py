@@ -230,7 +230,7 @@ def _read(document: Mapping[str, Any]) -> Plan:
     for name, joint in robot.get("fixed_joints", {}).items():
         if plan.fixed.get(joint["joint"]) != float(placed[name]):
             raise ValueError(f"{joint['joint']} is not at the scene's {name}")
-    grounded = set(plan.tables)
+    grounded = {*plan.tables, *plan.hands}
     for _ in plan.boxes:
         grounded |= {name for name, box in plan.boxes.items() if box["on"] in grounded}
     if not plan.boxes.keys() <= grounded:
@@ -360,7 +360,9 @@ class State:
 
 
 def _start(plan: Plan) -> State:
-    return State({name: box["on"] for name, box in plan.boxes.items()}, {})
+    holds = {box["on"]: name for name, box in plan.boxes.items() if box["on"] in plan.hands}
+    stands = {name: box["on"] for name, box in plan.boxes.items() if name not in holds.values()}
+    return State(stands, holds)
 
 
 def _legal(plan: Plan) -> Iterator[Fault]:
@@ -418,6 +420,17 @@ class Event:
     released: Attachment | None
 
 
+def _in_hands(plan: Plan) -> list[Attachment]:
+    """Of the boxes that are in a hand at the start."""
+    holds = _start(plan).holds
+    return [a for a in plan.attachments if a.start == 0 and holds.get(a.gripper) == a.box]
+
+
+def _taken(plan: Plan, events: Sequence[Event]) -> list[Attachment]:
+    """Of the boxes that grippers hold, from the start or since an action."""
+    return [*_in_hands(plan), *(event.taken for event in events if event.taken is not None)]
+
+
 def _events(plan: Plan) -> list[Event]:
     """When each action takes effect, in the order of the actions.
 
@@ -426,7 +439,7 @@ def _events(plan: Plan) -> list[Event]:
     one.
     """
     events: list[Event] = []
-    held: dict[str, Attachment] = {}
+    held = {attachment.gripper: attachment for attachment in _in_hands(plan)}
     now, last = 0, len(plan.times) - 1
     for action in plan.actions:
         kind, gripper, *others = action
@@ -682,6 +695,11 @@ def _carry(plan: Plan, tools: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]
     """Poses (n, 4, 4) of the boxes: at rest, or rigid in the tool frame they are attached to."""
     rows = len(plan.times)
     poses = {name: np.tile(_scene_pose(plan, name), (rows, 1, 1)) for name in plan.boxes}
+    for gripper, name in _start(plan).holds.items():
+        grasp = np.eye(4)
+        grasp[:3, 3] = plan.boxes[name]["grasp"][:3]
+        grasp[:3, :3] = Rotation.from_quat(plan.boxes[name]["grasp"][3:]).as_matrix()
+        poses[name][:] = tools[gripper][0] @ grasp
     for box, gripper, start, end in plan.attachments:
         tool, pose = tools[gripper], poses[box]
         pose[start : end + 1] = tool[start : end + 1] @ (_inverse(tool[start]) @ pose[start])
@@ -800,15 +818,15 @@ def _fingers(plan: Plan, events: Sequence[Event], motion: Motion) -> Iterator[Fa
 
 def _held(plan: Plan, events: Sequence[Event]) -> Iterator[Attachment]:
     """Boxes in hands whose fingers move."""
-    for event in events:
-        if event.taken is not None and plan.hands[event.taken.gripper].fingers:
-            yield event.taken
+    for taken in _taken(plan, events):
+        if plan.hands[taken.gripper].fingers:
+            yield taken
 
 
 def _grasps(plan: Plan, robot: Robot, events: Sequence[Event], motion: Motion) -> Iterator[Fault]:
     """When a gripper takes hold of a box, fingers are at it on opposite sides of it."""
     with _World(plan, robot) as world:
-        for taken in (event.taken for event in events if event.taken is not None):
+        for taken in _taken(plan, events):
             box, gripper, row, _ = taken
             hand = plan.hands[gripper]
             into = _inverse(motion.tools[gripper][row])
@@ -950,7 +968,7 @@ def _declared_contacts(
 ) -> dict[tuple[str, str], list[tuple[int, int]]]:
     """Intervals, by link of a hand and box, from the approach to a box to the retreat from it."""
     contacts: dict[tuple[str, str], list[tuple[int, int]]] = {}
-    for box, gripper, start, end in (event.taken for event in events if event.taken is not None):
+    for box, gripper, start, end in _taken(plan, events):
         tool = motion.tools[gripper]
         begin = _leaves(tool, start, APPROACH, -1) or 0
         until = _leaves(tool, end, APPROACH, 1) or len(tool)

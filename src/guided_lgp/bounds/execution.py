@@ -69,6 +69,10 @@ def execute(
     planned = final_boxes(scene, trajectory)
     with World(scene) as world:
         run = _Execution(world, trajectory)
+        for box, gripper in sorted(scene.held.items()):
+            run.touch(gripper, box)
+            if fault := run.grasp(gripper, box):
+                return PhysicsReport(False, fault=fault)
         run.rest()
         state, left = scene.state, set[tuple[str, str]]()
         for action, row in zip(skeleton, rows, strict=True):

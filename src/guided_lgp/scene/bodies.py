@@ -89,6 +89,7 @@ Length = Annotated[
 ]
 Point = tuple[Coordinate, Coordinate, Coordinate]
 Component = Annotated[float, Field(strict=True, ge=-1.001, le=1.001, allow_inf_nan=False)]
+Pose = tuple[Coordinate, Coordinate, Coordinate, Component, Component, Component, Component]
 Quaternion = tuple[Component, Component, Component, Component]
 Colour = Annotated[str, AfterValidator(_known_colour)]
 
@@ -173,7 +174,7 @@ class Solid(Document):
         """Read the mesh, and put the frame of its hull where the centre of mass is."""
         if self.mesh is not None:
             folder = (info.context or {}).get("folder", Path())
-            self._become(shape="mesh", mesh=None, vertices=_points(read_mesh(folder / self.mesh)))
+            self.become(shape="mesh", mesh=None, vertices=_points(read_mesh(folder / self.mesh)))
         if (self.shape == "mesh") != bool(self.vertices):
             raise ValueError("a mesh has vertices, or the file of a mesh; nothing else has")
         if self.shape == "mesh":
@@ -187,9 +188,9 @@ class Solid(Document):
     def _take_hull(self) -> None:
         vertices, origin = hull(np.array(self.vertices))
         centre = _rounded(apply(self.placement, origin)) if origin.any() else self.position
-        self._become(vertices=_points(vertices), position=centre, size=_extents(vertices))
+        self.become(vertices=_points(vertices), position=centre, size=_extents(vertices))
 
-    def _become(self, **changes: object) -> None:
+    def become(self, **changes: object) -> None:
         """While the document is read, bring it into the form that the rest of it is in."""
         self.__dict__.update(changes)
 
@@ -199,9 +200,14 @@ class Obstacle(Solid):
 
 
 class Box(Solid):
-    """A movable body, as a rule a box; it stands on ``on``."""
+    """A movable body, as a rule a box; it stands on ``on``, or is held by that gripper."""
 
+    position: Point = (0.0, 0.0, 0.0)
+    """Not of a body in a hand: its pose follows from the hand's."""
     on: Name = Field(default="", exclude_if=_is_default)
+    grasp: Pose | None = Field(default=None, exclude_if=_is_default)
+    """Of a body in a hand, whose gripper ``on`` names: pose ``[x, y, z, qx, qy, qz, qw]`` in the
+    frame of the tool (x out of the palm, fingers close along y). By default, as deep as it goes."""
     fixed: bool = Field(default=False, strict=True, exclude_if=_is_default)
     """A body that others may stand on, but that nobody moves; ``on`` may then be left out."""
 
@@ -213,7 +219,7 @@ class Box(Solid):
         if self.quaternion is not None:
             turn = rotation_matrix(_unit(self.quaternion))
             turned = self._turned_mesh(turn) if self.shape == "mesh" else self._turned(turn)
-            self._become(quaternion=None, **turned)
+            self.become(quaternion=None, **turned)
         return self
 
     def _turned_mesh(self, turn: Array) -> dict[str, object]:

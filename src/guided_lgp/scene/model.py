@@ -1,6 +1,7 @@
 """The scene document: robot, tables, boxes and obstacles."""
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -26,6 +27,7 @@ from guided_lgp.logic import State, Symbols
 from guided_lgp.poses import Array, compose, pose, quaternion
 from guided_lgp.robots import Robot, load_robot, tilted_robot
 from guided_lgp.scene.bodies import Angle, Body, Box, Coordinate, Obstacle, Table
+from guided_lgp.scene.grasps import grasp_from_above
 from guided_lgp.scene.shapes import Convex
 
 _LEVEL = 1e-9
@@ -172,17 +174,6 @@ class PlacedRobot(BaseModel):
         return document
 
 
-def grasp_axes(size: tuple[float, float, float], widest: float) -> tuple[int, ...]:
-    """The box axes that fingers can close along, the narrower one first (0: x, 1: y).
-
-    Args:
-        size: extents (m) of the box.
-        widest: side (m) that the hand can take.
-    """
-    order = (0, 1) if size[0] < size[1] else (1, 0)
-    return tuple(axis for axis in order if size[axis] <= widest)
-
-
 class Scene(Document):
     """An initial configuration x_0 with its symbols, and the domain whose actions may be used."""
 
@@ -208,6 +199,12 @@ class Scene(Document):
     def movable(self) -> tuple[Box, ...]:
         """The boxes that may be moved."""
         return tuple(box for box in self.boxes if not box.fixed)
+
+    @property
+    def held(self) -> dict[str, str]:
+        """The gripper of each box that is in a hand at the start."""
+        hands = self.robot.description.grippers
+        return {box.name: box.on for box in self.movable if box.on in hands}
 
     @property
     def supports(self) -> tuple[Table | Box, ...]:
@@ -236,7 +233,9 @@ class Scene(Document):
     @property
     def state(self) -> State:
         """The initial symbolic state."""
-        return load_domain(self.domain).state({box.name: box.on for box in self.movable})
+        hands = self.robot.description.grippers
+        support = {box.name: box.on for box in self.movable if box.on not in hands}
+        return load_domain(self.domain).state(support, self.held)
 
     @field_validator("domain")
     @classmethod
@@ -257,10 +256,27 @@ class Scene(Document):
             if name in parts:
                 raise ValueError(f"name {name!r} is that of a part of the robot")
             taken.add(name)
-        supports = {body.name for body in (*self.supports, *self.movable)}
+        supports = {body.name for body in (*self.supports, *self.movable)} - self.held.keys()
         for box in self.movable:
+            if box.name in self.held:
+                continue
             if box.on not in supports or box.on == box.name:
                 raise ValueError(f"box {box.name!r} stands on unknown table {box.on!r}")
+            if "position" not in box.model_fields_set:
+                raise ValueError(f"box {box.name!r} has no position")
+        return self
+
+    @model_validator(mode="after")
+    def _hands(self) -> "Scene":
+        """A hand holds one body; how, is filled in where the document leaves it out."""
+        for gripper, count in Counter(self.held.values()).items():
+            if count > 1:
+                raise ValueError(f"{gripper} holds {count} boxes at the start")
+        boxes = {box.name: box for box in self.movable}
+        for name, gripper in self.held.items():
+            if boxes[name].grasp is None:
+                grasp = grasp_from_above(boxes[name], self.robot.description.arms[gripper])
+                boxes[name].become(grasp=grasp)
         return self
 
 

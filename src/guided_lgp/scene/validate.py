@@ -9,7 +9,7 @@ from guided_lgp.scene.bodies import TABLE_THICKNESS, Box, Table
 from guided_lgp.scene.footprints import footprint, gap, inset, seat
 from guided_lgp.scene.model import Scene
 from guided_lgp.scene.tolerances import FLOAT, OVERLAP
-from guided_lgp.scene.world import initial_poses, world_of
+from guided_lgp.scene.world import initial_poses, poses_at_side, world_of
 
 
 def validate_scene(scene: Scene, where: str = "scene") -> None:
@@ -28,9 +28,10 @@ def validate_scene(scene: Scene, where: str = "scene") -> None:
     _validate_tables(scene, where)
     _validate_robots_place(scene, where)
     fields = {box.name: f"{where}: boxes.{i} ({box.name})" for i, box in enumerate(scene.boxes)}
-    for box in scene.movable:
+    standing = [box for box in scene.movable if box.name not in scene.held]
+    for box in standing:
         _validate_height(scene, box, fields[box.name])
-    for box in scene.movable:
+    for box in standing:
         _validate_balance(scene, box, fields[box.name])
     _validate_overlaps(scene, where)
 
@@ -107,8 +108,12 @@ def _validate_overlaps(scene: Scene, where: str) -> None:
     """At the start, and with all arms at their side, where they go first."""
     world, robot = world_of(scene), scene.robot
     supports = {frozenset((box.name, box.on)) for box in scene.movable}
-    for q, field in ((robot.description.home, "boxes"), (robot.start, "robot.joints")):
-        world.set(q, initial_poses(scene))
+    for box, gripper in scene.held.items():
+        links = robot.description.arms[gripper].hand_links
+        supports |= {frozenset((box, link)) for link in links}
+    sides = (robot.description.home, poses_at_side(scene), "boxes")
+    for q, boxes, field in (sides, (robot.start, initial_poses(scene), "robot.joints")):
+        world.set(q, boxes)
         for overlap in world.penetrations(OVERLAP):
             if overlap.bodies not in supports:
                 fault = f"{overlap.first} and {overlap.second} overlap by {overlap.depth:.3f} m"

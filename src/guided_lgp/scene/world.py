@@ -333,7 +333,21 @@ def world_of(scene: Scene) -> World:
 
 def initial_poses(scene: Scene) -> dict[str, Array]:
     """Pose (7,) of every box at the start."""
-    return {box.name: box.placement for box in scene.movable}
+    return _poses(scene, scene.robot.start)
+
+
+def poses_at_side(scene: Scene) -> dict[str, Array]:
+    """Pose (7,) of every box when the arms have gone to their side, before the first action."""
+    return _poses(scene, scene.robot.description.home)
+
+
+def _poses(scene: Scene, q: Array) -> dict[str, Array]:
+    poses = {box.name: box.placement for box in scene.movable}
+    for box in scene.movable:
+        if box.grasp is not None:
+            tool = scene.robot.tool_pose(q, scene.held[box.name])
+            poses[box.name] = compose(tool, np.array(box.grasp))
+    return poses
 
 
 def _colour(body: Body | Column) -> Vector:

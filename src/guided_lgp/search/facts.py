@@ -29,7 +29,7 @@ from guided_lgp.logic.objectives import parents_wanted_by
 from guided_lgp.robots import Robot
 from guided_lgp.scene.bodies import Box
 from guided_lgp.scene.footprints import footprint, gap
-from guided_lgp.scene.model import grasp_axes
+from guided_lgp.scene.grasps import grasp_axes
 from guided_lgp.scene.tolerances import MARGIN
 from guided_lgp.search.conflicts import Conflicts
 

@@ -23,6 +23,7 @@ from guided_lgp.bounds.results import Array
 from guided_lgp.bounds.terms import find_term, kernel_table, term_names
 from guided_lgp.bounds.terms.apart import keep_apart
 from guided_lgp.bounds.terms.clear import keep_clear
+from guided_lgp.bounds.terms.hold import take_over
 from guided_lgp.bounds.terms.term import GoalTerm
 from guided_lgp.errors import InputError
 from guided_lgp.logic import Domain, GroundInstruction, GroundTerm, Skeleton, successor
@@ -69,6 +70,8 @@ class Formulator:
         sides = self._variant.sides
         self._context = Context(geometry, robot, kernel_table(robot), margins, sides)
         self._final = final
+        for box, gripper in geometry.scene.held.items():
+            take_over(self._context, gripper, box)
         for term in lasting:
             self._add(term.name, *term.symbols, **term.options)
 

@@ -46,7 +46,7 @@ def assemble(robot: Robot, start: Situation, steps: Iterable[Step]) -> Trajector
     rows = [np.concatenate([start.q, *fingers])[None]]
     times = [np.zeros(1)]
     count = 1
-    open_since: dict[str, tuple[str, int]] = {}
+    open_since = {box: (gripper, 0) for box, (gripper, _) in start.carried.items()}
     attachments: list[Attachment] = []
     for step in steps:
         last = rows[-1][-1]

@@ -10,7 +10,7 @@ from guided_lgp.bounds.program.grasp import INSET, PALM_GAP
 from guided_lgp.bounds.results import Array
 from guided_lgp.robots import Arm
 from guided_lgp.scene import Box
-from guided_lgp.scene.model import grasp_axes
+from guided_lgp.scene.grasps import grasp_axes
 from guided_lgp.scene.shapes import Convex
 
 _PITCHES = 8

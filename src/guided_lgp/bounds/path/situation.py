@@ -6,11 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pinocchio as pin
 
+from guided_lgp.bounds.checks import closing_axis
 from guided_lgp.bounds.collision import PlanningScene
 from guided_lgp.bounds.path.motions import Motion, Surroundings
 from guided_lgp.bounds.results import Array, Keyframe
 from guided_lgp.logic import State
-from guided_lgp.poses import compose, inverse
+from guided_lgp.poses import IDENTITY, compose, inverse
 from guided_lgp.robots import PlacedArm
 from guided_lgp.scene import Scene
 from guided_lgp.scene.world import initial_poses
@@ -111,8 +112,16 @@ class Situation:
 def situation_at_start(scene: Scene, upright: frozenset[str] = frozenset()) -> Situation:
     """Where a plan begins: the arms where the scene has them, the hands closed."""
     robot = scene.robot.description
+    standing, carried = initial_poses(scene), {}
     fingers = {gripper: arm.fingers.closed for gripper, arm in robot.arms.items()}
-    return Situation(scene.state, scene.robot.start, fingers, initial_poses(scene), {}, upright)
+    for box in scene.movable:
+        if box.grasp is not None:
+            gripper, grasp = scene.held[box.name], np.array(box.grasp)
+            width = box.size[closing_axis(grasp.tolist(), IDENTITY.tolist())]
+            fingers[gripper] = robot.arms[gripper].fingers.value(width)
+            carried[box.name] = gripper, grasp
+            del standing[box.name]
+    return Situation(scene.state, scene.robot.start, fingers, standing, carried, upright)
 
 
 def tool_pose(arm: PlacedArm, q: Array) -> Array:

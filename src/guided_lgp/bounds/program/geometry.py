@@ -11,7 +11,8 @@ from guided_lgp.poses import apply, inverse, pose, yaw_of
 from guided_lgp.scene import Scene
 from guided_lgp.scene.bodies import Body
 from guided_lgp.scene.footprints import gap
-from guided_lgp.scene.model import Column, grasp_axes
+from guided_lgp.scene.grasps import grasp_axes
+from guided_lgp.scene.model import Column
 from guided_lgp.scene.shapes import Convex, Vector
 
 

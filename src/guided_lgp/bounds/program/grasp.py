@@ -8,11 +8,15 @@ bound, path bound and verification: the palm is outside of it, by ``PALM_GAP`` o
 tool frame's origin, which is between the fingertips, is over its side, by ``INSET`` or more.
 """
 
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import product
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from guided_lgp.bounds.program.geometry import GraspSide
 from guided_lgp.bounds.program.kernels import absolute
 from guided_lgp.bounds.program.slots import HeldBox
 from guided_lgp.bounds.results import Array
@@ -24,6 +28,8 @@ INSET = 0.003
 """How far inside the box's side the tool frame's origin is at least (m): a box of 25 mm on a table
 is grasped from above only so. Fingertips reach 3 to 19 mm beyond that point and 11 mm to its sides,
 so at least 6 by 14 mm of them are on the box."""
+_SAME = 1e-4
+"""Difference (m, or sine of half an angle) of poses that are one."""
 Hand = tuple[float, float]
 """Offset of a hand and its depth (m)."""
 
@@ -92,3 +98,20 @@ def in_tool(held: HeldBox, values: Array, palm_front: float) -> Array:
     level = np.array([0.0, -np.sin(pitch / 2), 0.0, np.cos(pitch / 2)])
     turned = multiply(level, pose((0, 0, 0), -held.side.turn)[3:])
     return np.array([reach + palm_front + depth, 0.0, offset, *turned])
+
+
+def read_grip(
+    grasp: Array, sides: Sequence[GraspSide], half_height: float, palm_front: float
+) -> tuple[GraspSide, tuple[float, float, float]] | None:
+    """The side, and pitch, offset and depth, of the pose (7,) of a box in the tool frame.
+
+    The inverse of :func:`in_tool`; None if the hand does not hold the box so.
+    """
+    for side, about in product(sides, (0.0, np.pi)):
+        turned = replace(side, turn=side.turn + about)
+        x, y, z, w = multiply(grasp[3:], pose((0, 0, 0), turned.turn)[3:]).tolist()
+        pitch = float(2 * np.arctan2(-y, w) % (2 * np.pi))
+        if max(abs(x), abs(z), abs(grasp[1])) < _SAME and pitch <= np.pi + _SAME:
+            reach = side.half_length * abs(np.cos(pitch)) + half_height * np.sin(pitch)
+            return turned, (pitch, float(grasp[2]), float(grasp[0] - reach - palm_front))
+    return None

@@ -13,7 +13,7 @@ import numpy as np
 from guided_lgp.bounds.checks import Pose, Vector, angle_of, axes_of, closing_axis, dot, offset_of
 from guided_lgp.bounds.program.context import Context, Line
 from guided_lgp.bounds.program.draft import Draft
-from guided_lgp.bounds.program.grasp import INSET, PALM_GAP, tool_target
+from guided_lgp.bounds.program.grasp import INSET, PALM_GAP, read_grip, tool_target
 from guided_lgp.bounds.program.kernels import SCALE, Kernel, kernel
 from guided_lgp.bounds.program.kinematics import Chain, RobotKinematics
 from guided_lgp.bounds.program.slots import (
@@ -24,6 +24,7 @@ from guided_lgp.bounds.program.slots import (
 )
 from guided_lgp.bounds.results import Array
 from guided_lgp.bounds.terms.term import Term, UngraspableError
+from guided_lgp.errors import InputError
 from guided_lgp.scene.tolerances import MARGIN
 
 GRASP_OFFSET = 0.003
@@ -108,6 +109,27 @@ def _new_grip(context: Context, gripper: str, box: str) -> HeldBox:
     )
 
 
+def take_over(context: Context, gripper: str, box: str) -> None:
+    """Begin with a box in a hand, which holds it as the scene says.
+
+    Raises:
+        InputError: that is none of the ways in which hands hold boxes.
+    """
+    arm = context.robot.arms[gripper].arm
+    body = next(body for body in context.geometry.scene.movable if body.name == box)
+    sides = context.geometry.grasp_sides(box, arm.fingers.grasp_width)
+    found = read_grip(np.array(body.grasp), sides, context.half(box)[2], arm.palm_front)
+    if found is None:
+        accepted = "fingers across upright sides, the body level when the hand points down or ahead"
+        raise InputError(f"{box}.grasp", f"{gripper} does not hold the body so", accepted)
+    side, given = found
+    pitch, offset, depth = (context.program.variable(v, v, 1e-3, v) for v in given)
+    closed = (arm.fingers.widest - arm.fingers.opening_for(side.width)) / 2
+    held = HeldBox(gripper, box, pitch, offset, depth, side, context.half(box)[2], closed, given)
+    context.hands[gripper] = context.held[box] = held
+    context.grips.append(held)
+
+
 def configuration(
     context: Context, held: HeldBox, pose: PlanarPose, lines: Iterable[Line] = ()
 ) -> ArmConfiguration:
@@ -167,7 +189,7 @@ def start(draft: Draft, held: HeldBox) -> None:
         return
     places = [draft.pose(configuration.pose) for configuration in held.configurations]
     tried = pitches(draft, held)
-    if held.pitch >= draft.kept:
+    if held.given is None and held.pitch >= draft.kept:
         tried = tried + draft.noise * draft.generator.uniform(-_PITCH_SPREAD, _PITCH_SPREAD)
         costs = sum(
             least_costs(draft, held, place[None], configuration.segments, tried)[0]
@@ -186,7 +208,7 @@ def start(draft: Draft, held: HeldBox) -> None:
 
 def pitches(draft: Draft, held: HeldBox) -> Array:
     """Pitches (rad) that are tried: the one of before where there is one."""
-    if held.pitch < draft.kept:
+    if held.given is not None or held.pitch < draft.kept:
         return draft.values[[held.pitch]]
     return _PITCHES
 

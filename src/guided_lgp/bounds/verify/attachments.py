@@ -81,7 +81,7 @@ def spans(
         rows: how many there are.
         carriers: the gripper of each box in a state.
     """
-    since: dict[str, tuple[str, int]] = {}
+    since = {box: (gripper, 0) for box, gripper in carriers(state).items()}
     for action, switch in zip(skeleton, switches, strict=True):
         state = successor(state, action)
         now = carriers(state)

@@ -12,7 +12,7 @@ from guided_lgp.bounds.terms.carried import Relative, relative
 from guided_lgp.bounds.verify.geometry import declared, grasp_faults, placement_faults
 from guided_lgp.logic import Action, Skeleton, State, successor
 from guided_lgp.robots import Robot
-from guided_lgp.scene.world import World, initial_poses
+from guided_lgp.scene.world import World, poses_at_side
 
 LIMIT_TOLERANCE = 1e-6
 
@@ -84,7 +84,7 @@ def verify_keyframes(
         The first violation with its action, or None.
     """
     state = world.scene.state
-    start = Keyframe(world.scene.robot.description.home, initial_poses(world.scene))
+    start = Keyframe(world.scene.robot.description.home, poses_at_side(world.scene))
     for action in skeleton[:verified]:
         state = successor(state, action)
     before = after_action[verified - 1] if verified else start

@@ -1,0 +1,43 @@
+"""How a hand holds a body at the start, where the scene leaves it open."""
+
+import math
+
+import numpy as np
+
+from guided_lgp.poses import multiply, pose
+from guided_lgp.robots import Arm
+from guided_lgp.scene.bodies import Box
+
+_PALM_GAP = 0.002
+"""Distance (m) of the palm from the body."""
+_INSET = 0.003
+"""How far (m) the point between the fingertips is inside the side that they press on, at least."""
+
+
+def grasp_axes(size: tuple[float, float, float], widest: float) -> tuple[int, ...]:
+    """The box axes that fingers can close along, the narrower one first (0: x, 1: y).
+
+    Args:
+        size: extents (m) of the box.
+        widest: side (m) that the hand can take.
+    """
+    order = (0, 1) if size[0] < size[1] else (1, 0)
+    return tuple(axis for axis in order if size[axis] <= widest)
+
+
+def grasp_from_above(box: Box, arm: Arm) -> tuple[float, ...]:
+    """Pose (7,) of a box in the tool frame of a hand that holds it from above, as deep as it goes.
+
+    Raises:
+        ValueError: no side of the box is narrow enough.
+    """
+    widest = arm.fingers.grasp_width
+    axes = grasp_axes(box.size, widest)
+    if not axes:
+        raise ValueError(f"{arm.gripper} cannot hold {box.name!r}: no side of at most {widest} m")
+    height = box.size[2]
+    depth = max(_PALM_GAP, _INSET - arm.palm_front - height)
+    down = np.array([0.0, -math.sqrt(0.5), 0.0, math.sqrt(0.5)])
+    turn = pose((0.0, 0.0, 0.0), 0.0 if axes[0] == 1 else -math.pi / 2)[3:]
+    quaternion = (float(value) for value in multiply(down, turn))
+    return height / 2 + arm.palm_front + depth, 0.0, 0.0, *quaternion

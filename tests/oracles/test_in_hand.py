@@ -1,0 +1,88 @@
+"""Plans that begin with a box in a hand."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from plan_checker import check
+
+from guided_lgp.bounds.execution import execute
+from guided_lgp.bounds.plan_file import write_plan
+from guided_lgp.bounds.scene_bounds import SceneBounds
+from guided_lgp.errors import InputError
+from guided_lgp.logic import parse_objective, parse_skeleton
+from guided_lgp.params import load_params
+from guided_lgp.paths import SOURCES
+from guided_lgp.scene import Scene, parse_scene
+from guided_lgp.scene.validate import validate_scene
+
+PARAMS = load_params(SOURCES / "params.yaml").bounds
+SIZE = [0.15, 0.07, 0.1]
+
+
+def scene(*others: dict[str, Any], **held: Any) -> Scene:
+    tables = [
+        {"name": name, "position": [0.54, y, 0.6], "half_extents": [0.17, 0.2]}
+        for name, y in (("left", 0.33), ("right", -0.33))
+    ]
+    red = {"name": "red", "size": SIZE, "position": [0.48, 0.25, 0.65], "on": "left"}
+    boxes = [red, {"name": "blue", "size": SIZE, "on": "pr2R", **held}, *others]
+    return parse_scene({"tables": tables, "boxes": boxes}, "mine.json")
+
+
+@pytest.mark.parametrize(
+    ("grasp", "skeleton", "goal"),
+    [
+        (None, "(place pr2R blue right)", "(on blue right)"),
+        (None, "(grasp pr2L red) (place pr2L red right) (place pr2R blue red)", "(on blue red)"),
+        # from the front, 45 degrees down, a little off the middle
+        (
+            [0.03, 0, 0.01, 0, -0.3826834, 0, 0.9238795],
+            "(place pr2R blue right)",
+            "(on blue right)",
+        ),
+    ],
+)
+def test_what_is_in_a_hand_is_put_down(
+    tmp_path: Path, grasp: list[float] | None, skeleton: str, goal: str
+) -> None:
+    start = scene(**({} if grasp is None else {"grasp": grasp}))
+    validate_scene(start)
+    assert Scene.model_validate(start.model_dump(mode="json")) == start
+    result = SceneBounds(start, PARAMS).path(parse_skeleton(skeleton))
+    assert result.feasible, result.failure
+    objective = parse_objective([goal])
+    assert result.trajectory is not None
+    assert execute(start, objective, parse_skeleton(skeleton), result.trajectory).success
+    write_plan(tmp_path / "plan.json", start, objective, result, {})
+    plan = json.loads((tmp_path / "plan.json").read_text())
+    assert check(plan) == []
+    plan["scene"]["boxes"][1]["grasp"][2] += 0.01
+    assert check(plan) != []
+
+
+@pytest.mark.parametrize(
+    ("others", "held", "fault"),
+    [
+        ([], {"size": [0.15, 0.12, 0.1]}, r"pr2R cannot hold 'blue': no side of at most"),
+        ([{"name": "c", "size": SIZE, "on": "pr2R"}], {}, "pr2R holds 2 boxes at the start"),
+        ([{"name": "c", "size": SIZE, "on": "left"}], {}, "'c' has no position"),
+        (
+            [{"name": "c", "size": SIZE, "position": [0.5, 0, 0.9], "on": "blue"}],
+            {},
+            "'c' stands on unknown table 'blue'",
+        ),
+    ],
+)
+def test_a_hand_that_cannot_hold_is_told(
+    others: list[dict[str, Any]], held: dict[str, Any], fault: str
+) -> None:
+    with pytest.raises(InputError, match=fault):
+        scene(*others, **held)
+
+
+def test_a_grasp_that_is_none_is_told() -> None:
+    tilted = scene(grasp=[0.03, 0, 0, 0.3, 0, 0, 0.953939])
+    with pytest.raises(InputError, match=r"blue\.grasp: pr2R does not hold the body so"):
+        SceneBounds(tilted, PARAMS).coarse(parse_skeleton("(place pr2R blue right)"))
