@@ -14,7 +14,15 @@ import pyarrow.parquet as pq
 import pytest
 
 from guided_lgp import documents
-from guided_lgp.documents import read_json, read_yaml, write_json, write_text, written_whole
+from guided_lgp.documents import (
+    copy_whole,
+    made_whole,
+    read_json,
+    read_yaml,
+    write_json,
+    write_text,
+    written_whole,
+)
 from guided_lgp.errors import InputError, shortened
 
 CONTENT = np.random.default_rng(1).bytes(2**20)
@@ -280,3 +288,45 @@ def test_a_folder_that_cannot_be_made(tmp_path: Path) -> None:
     for path in (tmp_path / "data" / "file.json", Path("/proc/data/file.json")):
         with pytest.raises(InputError, match=f"{path}: cannot be written: "):
             write_json(path, {})
+
+
+def test_a_folder_is_there_whole_or_not_at_all(tmp_path: Path) -> None:
+    target = tmp_path / "deep" / "folder"
+
+    def make(interrupted: bool) -> None:
+        with made_whole(target) as folder:
+            folder.mkdir()
+            (folder / "b").write_text("half")
+            if interrupted:
+                raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        make(interrupted=True)
+    assert list(target.parent.iterdir()) == []
+    for _ in range(2):  # an empty one is no hindrance
+        with made_whole(target) as folder:
+            assert not target.exists() or not list(target.iterdir())
+            folder.mkdir()
+    (target / "a").write_text("mine")
+    with pytest.raises(InputError, match=r"folder: cannot be written: .*not empty"):
+        make(interrupted=False)
+    assert [file.name for file in target.parent.rglob("*")] == ["folder", "a"]
+
+
+def test_what_killed_makers_of_a_folder_left_goes(tmp_path: Path) -> None:
+    left = tmp_path / ".unfinished-0123-folder"
+    (left / "folder").mkdir(parents=True)
+    os.utime(left, (0, 0))
+    with made_whole(tmp_path / "folder") as folder:
+        folder.mkdir()
+        assert not left.exists()
+    assert [file.name for file in tmp_path.iterdir()] == ["folder"]
+
+
+def test_a_copy_has_every_file(tmp_path: Path) -> None:
+    for name in ("a", "deep/b"):
+        (tmp_path / "from" / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "from" / name).write_text(name)
+    copy_whole(tmp_path / "from", tmp_path / "to")
+    assert (tmp_path / "to" / "deep" / "b").read_text() == "deep/b"
+    assert len(list((tmp_path / "to").rglob("*"))) == 3

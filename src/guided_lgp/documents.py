@@ -266,8 +266,6 @@ def copy_whole(source: Path, target: Path) -> None:
 def made_whole(folder: Path) -> Iterator[Path]:
     """Make a folder such that nobody ever sees half of it, whatever ends the program.
 
-    What a killed maker left is taken away by the next one.
-
     Args:
         folder: is not there, or is empty.
 
@@ -277,22 +275,37 @@ def made_whole(folder: Path) -> Iterator[Path]:
     Raises:
         InputError: the folder cannot be made, or is there with something in it.
     """
-    end = folder.name[-_LONGEST_END:]
-    with _named_errors(folder):
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        _remove_leftovers(folder.parent, end)
-        own = folder.with_name(f"{_UNFINISHED}{secrets.token_hex(8)}-{end}")
-        own.mkdir()
-        descriptor = os.open(own, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
-        try:
-            with suppress(OSError):  # of file systems without locks
-                fcntl.flock(descriptor, fcntl.LOCK_EX)
-            yield own / folder.name
-            (own / folder.name).rename(folder)
-        finally:
-            with suppress(OSError):
-                remove(own)
-            os.close(descriptor)
+    with _named_errors(folder), unfinished_beside(folder) as own:
+        yield own / folder.name
+        (own / folder.name).rename(folder)
+
+
+@contextmanager
+def unfinished_beside(path: Path) -> Iterator[Path]:
+    """A folder of this writer's own, for what will get its name when it is whole.
+
+    It is gone at the end; what a killed writer left is taken away by the next one.
+
+    Args:
+        path: what is made; its folder is made, too.
+
+    Raises:
+        OSError: it cannot be made.
+    """
+    end = path.name[-_LONGEST_END:]
+    path.parent.mkdir(parents=True, exist_ok=True)
+    _remove_leftovers(path.parent, end)
+    own = path.with_name(f"{_UNFINISHED}{secrets.token_hex(8)}-{end}")
+    own.mkdir()
+    descriptor = os.open(own, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    try:
+        with suppress(OSError):  # of file systems without locks
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield own
+    finally:
+        with suppress(OSError):
+            remove(own)
+        os.close(descriptor)
 
 
 def remove(entry: Path) -> None:

@@ -6,8 +6,9 @@ import platform
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
+
+from guided_lgp.documents import unfinished_beside
 
 EXPERIMENT = "guided-lgp"
 SQLITE = "sqlite:///"
@@ -75,8 +76,8 @@ def _make_database(file: Path) -> None:
 
     if file.exists():
         return
-    with TemporaryDirectory(dir=file.parent, prefix=".unfinished-") as folder:
-        made = Path(folder) / file.name
+    with unfinished_beside(file) as folder:
+        made = folder / file.name
         mlflow.MlflowClient(f"{SQLITE}{made}").search_experiments(max_results=1)
         with suppress(FileExistsError):  # another's, in which it may have recorded already
             file.hardlink_to(made)
