@@ -6,13 +6,13 @@ environment. Writes `reports/metrics/hostile.json`; ends with 1 if anything came
 """
 
 import argparse
-import json
 import os
 import shutil
 import statistics
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -20,7 +20,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from guided_lgp import cache
-from guided_lgp.documents import write_json
+from guided_lgp.documents import read_json, write_json
 from guided_lgp.experiments import (
     build_dataset,
     enumerate_sequences,
@@ -47,7 +47,19 @@ STAGES = {
 """Stages of the small profile, and the moments at which they are killed."""
 
 
-def inputs(folder: Path, seed: int, count: int, commands: int) -> tuple[Verdicts, dict[str, Any]]:
+Part = tuple[Any, list[str]]
+"""The figures of a part, and what came through."""
+
+
+def spoilt_inputs(folder: Path) -> Part:
+    """Judge the spoilt files and commands."""
+    found, by_reader = inputs(folder, SEED, INPUTS, COMMANDS)
+    return {**found.figures(), "by_reader": by_reader}, found.faults
+
+
+def inputs(
+    folder: Path, seed: int, count: int, commands: int
+) -> tuple[Verdicts, dict[str, dict[str, int]]]:
     """Judge so many spoilt files and commands: all verdicts, and the figures of each reader."""
     readers = loaders(folder)
     shares = sum(reader.share for reader in readers)
@@ -68,13 +80,19 @@ def inputs(folder: Path, seed: int, count: int, commands: int) -> tuple[Verdicts
     return every, figures
 
 
-def killed(folder: Path) -> kills.Figures:
+def killed(folder: Path) -> Part:
     """Kill every writer at every moment, and stages of the small profile at some."""
     figures = kills.Figures()
     for writer in writers(Examples(folder / "examples")):
         before = figures.inside_window
         writer.kill_everywhere(folder / writer.name.replace(" ", "-"), figures)
         print(f"{writer.name}: {figures.inside_window - before} kills", flush=True)
+    kill_stages(folder, figures)
+    return _counts(figures), figures.faults
+
+
+def kill_stages(folder: Path, figures: kills.Figures) -> None:
+    """Run stages of the small profile undisturbed, and with kills: they write the same bytes."""
     params = load_params(PARAMS)
     params = params.model_copy(
         update={"parallel": params.parallel.model_copy(update={"workers": 1})}
@@ -93,7 +111,53 @@ def killed(folder: Path) -> kills.Figures:
     for name in expected.keys() | found.keys():
         if expected.get(name) != found.get(name) and ".shards" not in name:
             figures.damage(f"{name} is another after kills")
-    return figures
+
+
+def raced(folder: Path) -> Part:
+    """Processes at once."""
+    figures = races.Figures()
+    races.all_races(folder, figures)
+    return _counts(figures), figures.faults
+
+
+def plants(folder: Path) -> Part:
+    """What somebody else left."""
+    folder.mkdir()
+    found = planted.all_plants(folder)
+    faults = [name for name, effective in found.items() if effective]
+    return {"tried": len(found), "effective": len(faults)}, faults
+
+
+def limited(folder: Path) -> Part:
+    """Full disks and little memory."""
+    figures = limits.Figures()
+    limits.write_on_full_disks(writers(Examples(folder / "examples")), folder / "disks", figures)
+    limits.plan_with_little_memory(folder / "memory", figures)
+    return _counts(figures), figures.faults
+
+
+def elsewhere(folder: Path) -> Part:
+    """Other environments."""
+    figures = environments.Figures()
+    environments.all_environments(folder, cache.cache_folder(), figures)
+    return _counts(figures), figures.faults
+
+
+def checks_at_the_start(folder: Path) -> Part:
+    """What the checks of the cache cost a plan (ms)."""
+    return round(startup_ms(), 2), []
+
+
+PARTS: dict[str, Callable[[Path], Part]] = {
+    "inputs": spoilt_inputs,
+    "kills": killed,
+    "races": raced,
+    "planted": plants,
+    "limits": limited,
+    "environments": elsewhere,
+    "startup_ms": checks_at_the_start,
+}
+"""By their names in the file."""
 
 
 _PLAN = """
@@ -126,56 +190,28 @@ def startup_ms() -> float:
     return statistics.median(float(run.stdout) for run in runs[1:])  # the first may fill the cache
 
 
-def verify(folder: Path, seed: int, count: int, commands: int) -> tuple[dict[str, Any], list[str]]:
-    """Everything: the figures, and what came through."""
-    faults: list[str] = []
-    tried, by_reader = inputs(folder / "inputs", seed, count, commands)
-    faults += tried.faults
-    kill = killed(folder / "kills")
-    race, disk, place = races.Figures(), limits.Figures(), environments.Figures()
-    races.all_races(folder / "races", race)
-    (folder / "planted").mkdir()
-    plants = planted.all_plants(folder / "planted")
-    small = writers(Examples(folder / "small"))
-    limits.write_on_full_disks(small, folder / "disks", disk)
-    limits.plan_with_little_memory(folder / "memory", disk)
-    environments.all_environments(folder / "environments", cache.cache_folder(), place)
-    for part in (kill, race, disk, place):
-        faults += part.faults
-    faults += [f"planted: {name}" for name, effective in plants.items() if effective]
-    figures = {
-        "seed": seed,
-        "inputs": {**tried.figures(), "by_reader": by_reader},
-        "kills": _without_faults(kill),
-        "races": _without_faults(race),
-        "planted": {"tried": len(plants), "effective": sum(plants.values())},
-        "limits": _without_faults(disk),
-        "environments": _without_faults(place),
-        "startup_ms": round(startup_ms(), 2),
-    }
-    return figures, faults
-
-
-def _without_faults(figures: Any) -> dict[str, int]:
+def _counts(figures: Any) -> dict[str, int]:
     return {name: value for name, value in asdict(figures).items() if name != "faults"}
 
 
 def main() -> int:
     """Run, write, judge."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--inputs", type=int, default=INPUTS)
-    parser.add_argument("--commands", type=int, default=COMMANDS)
-    parser.add_argument("--out", type=Path, default=RESULT)
-    words = parser.parse_args()
-    start = time.monotonic()
-    with TemporaryDirectory(prefix="hostile-") as folder:
-        figures, faults = verify(Path(folder), SEED, words.inputs, words.commands)
-    write_json(words.out, figures)
+    parser.add_argument("parts", nargs="*", metavar="PART", help=f"{', '.join(PARTS)}; or all")
+    chosen = parser.parse_args().parts or list(PARTS)
+    faults: list[str] = []
+    for name in chosen:
+        start = time.monotonic()
+        with TemporaryDirectory(prefix="hostile-") as folder:
+            figures, found = PARTS[name](Path(folder) / name)
+        known = read_json(RESULT) if RESULT.is_file() else {}
+        write_json(
+            RESULT, {"seed": SEED, **{p: known[p] for p in PARTS if p in known}, name: figures}
+        )
+        faults += [f"{name}: {fault}" for fault in found]
+        print(f"{name}: {len(found)} faults, {time.monotonic() - start:.0f} s", flush=True)
     for fault in faults:
         print(fault)
-    shown = {name: value for name, value in figures.items() if name != "inputs"}
-    print(json.dumps(figures["inputs"] | {"by_reader": None}), json.dumps(shown))
-    print(f"{time.monotonic() - start:.0f} s, {len(faults)} faults")
     return 1 if faults else 0
 
 

@@ -1,7 +1,6 @@
 """``examples export pddl schema view``: scenes and plans as files and pictures."""
 
 import json
-import shutil
 from enum import Enum
 from pathlib import Path
 from typing import Annotated
@@ -10,7 +9,7 @@ import typer
 
 from guided_lgp.cli.outputs import destinations
 from guided_lgp.cli.terminal import is_plan
-from guided_lgp.documents import made_whole, write_text
+from guided_lgp.documents import copy_whole, write_text
 from guided_lgp.errors import InputError
 from guided_lgp.paths import EXAMPLES
 
@@ -29,8 +28,7 @@ def examples(
     """
     if folder.exists() and any(folder.iterdir()):
         raise InputError(str(folder), "is not empty", "a new folder")
-    with made_whole(folder) as copy:
-        shutil.copytree(EXAMPLES, copy)
+    copy_whole(EXAMPLES, folder)
     for scene in sorted(folder.glob("*.json")):
         typer.echo(scene)
 
