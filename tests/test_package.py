@@ -2,8 +2,10 @@
 
 import ast
 import json
+import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import venv
@@ -96,6 +98,22 @@ def run(environment: Path, *words: str, cwd: Path) -> subprocess.CompletedProces
     )
 
 
+def viewed(environment: Path, file: str, folder: Path) -> str:
+    """What the viewer prints before it is interrupted; it must end well."""
+    with subprocess.Popen(
+        [environment / "bin" / "guided-lgp", "view", file],
+        cwd=folder,
+        env=os.environ | {"PYTHONUNBUFFERED": "1"},
+        text=True,
+        stdout=subprocess.PIPE,
+    ) as process:
+        assert process.stdout is not None
+        line = process.stdout.readline()
+        process.send_signal(signal.SIGINT)
+        assert process.wait(60) == 0
+    return line
+
+
 def test_the_wheel_plans_views_and_writes_a_page_from_an_empty_folder(
     environment: Path, tmp_path: Path
 ) -> None:
@@ -113,6 +131,7 @@ def test_the_wheel_plans_views_and_writes_a_page_from_an_empty_folder(
     assert "weights shipped with" in planned.stdout
     assert json.loads((tmp_path / "plan.json").read_text())["actions"]
     assert "<script" in (tmp_path / "plan.html").read_text()
+    assert viewed(environment, "plan.json", tmp_path).startswith("http://127.0.0.1:")
     exported = run(environment, "guided-lgp", "export", "plan.json", "motion.csv", cwd=tmp_path)
     assert exported.stdout == "written: motion.csv\n"
     assert "error" not in run(environment, "guided-lgp", "doctor", cwd=tmp_path).stderr
