@@ -1,0 +1,120 @@
+"""Benchmark of "infeasible": random sequences that the coarse bound denies, searched by other code.
+
+Placements are drawn anywhere on their supports; the path bound, which samples grips and postures
+and knows nothing of the coarse bound's program and solver, looks for the whole verified motion. One
+that it finds is a witness against the verdict. Sequences end at the action that is denied:
+
+    python benchmarks/witness.py [first scene [scenes]]
+"""
+
+import json
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from guided_lgp import parallel
+from guided_lgp.bounds.coarse import CoarseBound
+from guided_lgp.bounds.path import PathBound
+from guided_lgp.bounds.results import Array, CoarseResult, Keyframe
+from guided_lgp.bounds.scene_bounds import SceneBounds
+from guided_lgp.logic import Skeleton, applicable_actions, successor
+from guided_lgp.params import load_params
+from guided_lgp.paths import SOURCES
+from guided_lgp.poses import compose, inverse, pose
+from guided_lgp.scene import Scene
+from guided_lgp.scene.generate import generate
+from guided_lgp.scene.world import initial_poses
+
+PARAMETERS = load_params(SOURCES / "params.yaml")
+SEED = 20_005
+"""Of scenes, sequences and placements; no stage of the pipeline uses it."""
+SCENES, PER_SCENE = 60, 10
+"""How many scenes, and denied sequences of each."""
+LONGEST = 3
+DRAWS = 1
+"""Of all placements per sequence."""
+INSET = 0.01
+"""Distance (m) of a box's centre from the edge of its support."""
+
+
+def measure(first: int = 0, count: int = SCENES) -> dict[str, Any]:
+    """How many denied sequences were searched, and which of them have a witness."""
+    scenes = generate("a", first + count, SEED, "witness").scenes
+    tasks = [Task(scene, number) for number, scene in enumerate(scenes)][first:]
+    parts = parallel.run(run_task, tasks, PARAMETERS.parallel, "witnesses against no")
+    found = [witness for part in parts for witness in part]
+    return {"n": count * PER_SCENE, "found": len(found), "witnesses": found}
+
+
+@dataclass(frozen=True)
+class Task:
+    """One scene, and its number among all."""
+
+    scene: Scene
+    number: int
+
+
+def run_task(task: Task) -> list[str]:
+    """The denied sequences of a scene that have a witness."""
+    rng = np.random.default_rng([SEED, task.number])
+    path = PathBound(task.scene, CoarseBound(task.scene, 1), solutions=1)
+    return [
+        f"{task.scene.name}: {' '.join(map(str, skeleton))}"
+        for skeleton in _denied(task.scene, rng)
+        if any(path.solve(_drawn(task.scene, skeleton, rng)).feasible for _ in range(DRAWS))
+    ]
+
+
+def _denied(scene: Scene, rng: np.random.Generator) -> Iterator[Skeleton]:
+    """Different random sequences whose last action is denied, and no earlier one."""
+    bounds, seen = SceneBounds(scene, PARAMETERS.bounds), set()
+    while len(seen) < PER_SCENE:
+        state, skeleton = scene.state, Skeleton()
+        while len(skeleton) < LONGEST:
+            actions = list(applicable_actions(state, scene.symbols))
+            skeleton = (*skeleton, actions[rng.integers(len(actions))])
+            state = successor(state, skeleton[-1])
+            if not bounds.coarse(skeleton).feasible:
+                if skeleton not in seen:
+                    seen.add(skeleton)
+                    yield skeleton
+                break
+
+
+def _drawn(scene: Scene, skeleton: Skeleton, rng: np.random.Generator) -> CoarseResult:
+    """The sequence with placements anywhere on their supports, and all arms at their side."""
+    state, boxes = scene.state, initial_poses(scene)
+    keyframes = []
+    for action in skeleton:
+        ground = scene.symbols.domain.bind(action)
+        if not ground.into_hand:
+            placed = _on(scene, boxes, ground.body, ground.parent, rng)
+            moved = compose(placed, inverse(boxes[ground.body]))
+            riders = state.carried_by(ground.body)
+            boxes |= {rider: compose(moved, boxes[rider]) for rider in riders}
+            boxes[ground.body] = placed
+        keyframes.append(Keyframe(scene.robot.description.home, dict(boxes)))
+        state = successor(state, action)
+    return CoarseResult(skeleton, feasible=True, at_switch=tuple(keyframes))
+
+
+def _on(
+    scene: Scene, boxes: dict[str, Array], box: str, support: str, rng: np.random.Generator
+) -> Array:
+    """A level pose (7,) of a box on a support."""
+    sizes = {body.name: np.array(body.size) for body in scene.boxes}
+    if support in sizes:
+        top = compose(boxes[support], pose((0.0, 0.0, sizes[support][2] / 2)))
+        half = sizes[support][:2] / 2
+    else:
+        table = next(table for table in scene.tables if table.name == support)
+        top, half = pose(table.position, table.yaw), np.array(table.half_extents)
+    x, y = rng.uniform(-1, 1, 2) * (half - INSET)
+    return compose(top, pose((x, y, sizes[box][2] / 2), rng.uniform(-np.pi, np.pi)))
+
+
+if __name__ == "__main__":
+    print(json.dumps(measure(*map(int, sys.argv[1:])), indent=1))
