@@ -1,4 +1,4 @@
-"""Benchmark of the pipeline: rivals of guided search, enumeration by workers, training, memory.
+"""Benchmark of the pipeline: rivals of guided search, enumeration, training, memory, whole runs.
 
 The planners need the scenes and models of a pipeline run, the rest nothing:
 python benchmarks/pipeline.py
@@ -134,6 +134,24 @@ def memory() -> dict[str, float]:
     return peaks
 
 
+def minutes() -> dict[str, float]:
+    """Wall time of ``make repro`` and ``make test`` in a fresh clone, after installation."""
+    runs = {"repro": ["dvc", "repro", "-q"], "test": ["pytest", "-q", "-n", "auto"]}
+    figures = {}
+    with tempfile.TemporaryDirectory() as folder:
+        subprocess.run(["git", "clone", "-q", str(ROOT), folder], check=True)
+        environment = os.environ | {"PYTHONPATH": f"{folder}/src"}
+        environment["MLFLOW_TRACKING_URI"] = f"sqlite:///{folder}/mlflow.db"
+        for name, command in runs.items():
+            began = time.perf_counter()
+            subprocess.run(command, cwd=folder, env=environment, stdout=sys.stderr, check=True)
+            figures[name] = (time.perf_counter() - began) / 60
+    return figures | {"load_before": _LOAD}
+
+
+_LOAD = os.getloadavg()[0]
+"""Processes that ran or waited when this program began: times are those of a quiet machine at 0."""
+
 _PEAK = """
 import resource, subprocess, sys
 subprocess.run(sys.argv[1:], stdout=sys.stderr, check=True)
@@ -144,7 +162,7 @@ print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)
 
 if __name__ == "__main__":
     parts = {"planners": planners, "enumeration": enumeration}
-    parts |= {"training": training, "memory": memory}
+    parts |= {"training": training, "memory": memory, "minutes": minutes}
     chosen = sys.argv[1:] or list(parts)
     json.dump({name: parts[name]() for name in chosen}, sys.stdout, indent=1)
     sys.stdout.write("\n")

@@ -21,6 +21,7 @@ import against
 import coarse
 import path
 import pipeline
+import witness
 from guided_lgp.documents import read_json, write_json
 from guided_lgp.paths import METRICS
 from guided_lgp.report.benchmarks import PAGE, benchmark_page
@@ -53,6 +54,8 @@ MEASURES: dict[str, Callable[[int], Any]] = {
     "training": lambda count: pipeline.training(),
     "memory": lambda count: pipeline.memory(),
     "against": lambda count: against.measure(),
+    "false_infeasible": lambda count: witness.measure(),
+    "minutes": lambda count: pipeline.minutes(),
 }
 """By part, what measures it, given the number of sequences per length."""
 

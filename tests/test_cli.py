@@ -353,6 +353,7 @@ def test_doctor_says_how_to_mend(capsys: pytest.CaptureFixture[str]) -> None:
     assert findings["Python"]["ok"]
     assert findings["Robots"]["ok"]
     assert findings["Cache"]["ok"]
+    assert findings["Vectors"]["detail"]
     assert findings["Policy paper"]["ok"]
     assert all(finding["ok"] or finding["mend"] for finding in findings.values())
 

@@ -33,7 +33,8 @@ class Finding:
 
 def examine() -> list[Finding]:
     """Run every check, in an order in which each one makes sense."""
-    checks: list[Callable[[], Finding]] = [_python, _pybullet, _packages, _robot, _compiler, _cache]
+    checks: list[Callable[[], Finding]] = [_python, _pybullet, _packages, _robot]
+    checks += [_compiler, _vectors, _cache]
     checks += [partial(_policy, name) for name in POLICIES]
     return [check() for check in [*checks, _pipeline]]
 
@@ -82,6 +83,16 @@ def _compiler() -> Finding:
         return Finding("C compiler", True, "the one in the package ziglang")
     hint = "install a C compiler, or: pip install 'guided-lgp[compiler]'"
     return Finding("C compiler", True, "none: the solver is slower, with the same results", hint)
+
+
+def _vectors() -> Finding:
+    """The widest vectors that compiled code uses here; see ``compiled.py``."""
+    file = Path("/proc/cpuinfo")
+    words = file.read_text(encoding="utf-8").split() if file.is_file() else ()
+    for name, flag in (("AVX-512", "avx512f"), ("AVX2", "avx2")):
+        if flag in words:
+            return Finding("Vectors", True, name)
+    return Finding("Vectors", True, "no AVX2: compiled code is slower, with the same results")
 
 
 def _cache() -> Finding:

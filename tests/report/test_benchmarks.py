@@ -54,6 +54,8 @@ def test_every_part_has_a_table_and_ratios_come_from_one_run() -> None:
         {
             "machine": MACHINE,
             "against": against,
+            "minutes": {"repro": 12.34, "test": 7.0, "load_before": 0.1},
+            "false_infeasible": {"n": 600, "found": 3, "witnesses": []},
             "coarse_bound": {"4": coarse | {"ipopt": ipopt}},
             "path_bound": {"4": motion | {"physics_success_share": 0.98}},
             "enumeration": {"1": 80.0, "2": 150.0},
@@ -63,9 +65,11 @@ def test_every_part_has_a_table_and_ratios_come_from_one_run() -> None:
         }
     )
     assert "A CPU, 2 cores, 8.0 GB" in page
-    assert page.count("\n**") == 7
+    assert page.count("\n**") == 9
     lines = page.splitlines()
     assert "| path bound, K = 2 | 20.0 | 10.0 | 2.0× | 5 |" in lines
+    assert "| 12.3 | 7.0 | 0.1 |" in lines
+    assert "| 600 | 3 | 0.5% |" in lines
     assert not any("K = 10" in line for line in lines)
     assert "Verdicts that changed: 9 from infeasible to feasible, 0 from" in page
     row = next(line for line in lines if line.startswith(r"| c.1\*"))
