@@ -97,6 +97,19 @@ def test_boxes_that_block_each_other_are_named() -> None:
     assert facts(loose, "(on p3 right)").after_search() is None
 
 
+def test_a_box_between_others_that_no_hand_can_take() -> None:
+    walls = resized(ROW, p1=(0.3, 0.12, 0.1), p3=(0.3, 0.12, 0.1))
+    shift = {"p1": -0.025, "p3": 0.025}
+    boxes = [
+        box.model_copy(update={"position": (0.54, box.position[1] + shift.get(box.name, 0), 0.65)})
+        for box in walls.boxes
+    ]
+    finding = found(
+        facts(ROW.model_copy(update={"boxes": tuple(boxes)}), "(held p2)").after_search()
+    )
+    assert (finding.kind, finding.help) == ("blocked", "space between p1, p2, p3")
+
+
 def test_the_part_of_a_sequence_that_cannot_be_done() -> None:
     task = facts(ROW, "(on p1 right)")
     finding = found(task.about(parse_skeleton("(grasp pr2L p1)")))

@@ -257,9 +257,9 @@ class TaskFacts:
         found = [body]
         for name in found:  # it grows on the way
             blockers = self._blockers(name)
-            if not blockers or self._state.support_of(name) not in self._symbols.surfaces:
+            if blockers is None or self._state.support_of(name) not in self._symbols.surfaces:
                 return
-            found += sorted(set().union(*blockers) - set(found))
+            found += sorted(blockers - set(found))
         if len(found) > 1:
             names = [name for name in self._boxes if name in found]
             several = ", ".join(names)
@@ -270,17 +270,16 @@ class TaskFacts:
                 f"space between {several}",
             )
 
-    def _blockers(self, body: str) -> list[Boxes]:
-        """For every arm that can take a body alone, what keeps it from it; none if one is free."""
-        sets = []
+    def _blockers(self, body: str) -> Boxes | None:
+        """What keeps from a body the arms that could take it alone; None if one of them can."""
+        found = Boxes()
         for action in self._takings(body):
             blockers = self._pairs.blockers(action)
-            if Boxes() in blockers:
-                continue
             if not blockers:
-                return []
-            sets.append(Boxes().union(*blockers))
-        return sets
+                return None
+            if Boxes() not in blockers:
+                found = found.union(*blockers)
+        return found
 
     def _hand(self, names: list[str]) -> str:
         """What does not fit: fingers, or hands where there is more space."""
