@@ -8,11 +8,16 @@ import sys
 from pathlib import Path
 
 import pytest
+from dvc.cli.parser import get_main_parser
 from typer.main import get_command
 
 from guided_lgp import cli
+from guided_lgp.cli import STAGES
+from guided_lgp.params import load_params
+from guided_lgp.tracking import flatten
 
 ROOT = Path(__file__).parents[2]
+PARAMS = load_params(ROOT / "params.yaml")
 PAGES = sorted([ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").glob("*.md")])
 
 
@@ -27,7 +32,7 @@ def test_commands_and_options_exist(page: Path) -> None:
     group = get_command(cli.app)
     assert hasattr(group, "commands")
     for block in blocks(page, "sh"):
-        for line in block.replace("\\\n", " ").splitlines():
+        for line in block.replace("\\\n", " ").replace("&&", "\n").splitlines():
             words = line.split("#")[0].split()
             if words[:1] == ["make"]:
                 assert words[1] in targets, line
@@ -38,6 +43,18 @@ def test_commands_and_options_exist(page: Path) -> None:
                 assert used <= options, line
             if words[:1] == ["python"]:
                 assert (ROOT / words[1]).is_file(), line
+            if words[:1] == ["dvc"]:
+                check_dvc(words[1:])
+
+
+def check_dvc(words: list[str]) -> None:
+    """The command is one that DVC knows, on parameters and files that there are."""
+    arguments = get_main_parser().parse_args(words)
+    for change in getattr(arguments, "set_param", None) or []:
+        name, _, _ = change.partition("=")
+        assert name in flatten(PARAMS.model_dump()), change
+    for target in getattr(arguments, "targets", None) or []:
+        assert (ROOT / target).exists() or target in STAGES, target
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
