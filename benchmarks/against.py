@@ -272,17 +272,21 @@ PARTS: dict[str, Callable[[Pair], Any]] = {
 
 
 def ratios(figures: dict[str, Any]) -> dict[str, Any]:
-    """``speedup``: one number per row, old CPU time divided by new."""
+    """``speedup``: one number per row, old CPU time divided by new; null where nothing compares."""
     coarse = figures["coarse_bound"]
     return {
-        "path_bound": {length: row["ratio"] for length, row in figures["path_bound"].items()},
-        "coarse_infeasible": coarse["infeasible"]["ratio"],
-        "coarse_infeasible_without_fact": coarse["infeasible_without_fact"]["ratio"],
-        "coarse_feasible": coarse["feasible"]["ratio"],
-        "enumeration": figures["enumeration"]["ratio"],
-        "plan_process": {length: row["ratio"] for length, row in figures["plan_process"].items()},
-        "coarse_step_k40": figures["coarse_step"]["ratio"],
+        "path_bound": _ratios(figures["path_bound"]),
+        "coarse_infeasible": coarse["infeasible"].get("ratio"),
+        "coarse_infeasible_without_fact": coarse["infeasible_without_fact"].get("ratio"),
+        "coarse_feasible": coarse["feasible"].get("ratio"),
+        "enumeration": figures["enumeration"].get("ratio"),
+        "plan_process": _ratios(figures["plan_process"]),
+        "coarse_step_k40": figures["coarse_step"].get("ratio"),
     }
+
+
+def _ratios(rows: dict[str, Any]) -> dict[str, float | None]:
+    return {length: row.get("ratio") for length, row in rows.items()}
 
 
 def main(names: list[str]) -> None:
