@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from bad_input import UNICODE_NAMES, answer, examples, garbled, spoilt, write_json
+from bad_input import EXAMPLE, UNICODE_NAMES, answer, examples, garbled, spoilt, write_json
 from hypothesis import event, given
 from hypothesis import strategies as st
 
@@ -162,6 +162,22 @@ def test_spoilt_documents(
         assert Scene.model_validate_json(scene.model_dump_json()) == scene
         assert all(isfinite(value) for box in scene.boxes for value in (*box.position, box.yaw))
         assert {box.on for box in scene.boxes} <= set(scene.symbols.tables)
+
+
+@examples(150)
+@given(data=st.data())
+def test_spoilt_documents_of_version_2(data: st.DataObject, folder: Path) -> None:
+    """Cylinders, meshes, obstacles, what is fixed, on another face or in a hand, and a start."""
+    document = json.loads((EXAMPLE.parent / "kitchen.json").read_text())
+    document["robot"]["joints"] = {"l_shoulder_pan_joint": 0.4}
+    lying = {"quaternion": [0, 0.7071068, 0, 0.7071068], "position": [0.42, 0.45, 0.675]}
+    held = {"on": "pr2R", "grasp": [0.03, 0, 0.01, 0, -0.3826834, 0, 0.9238795]}
+    for name, fields in (("lying", {"on": "counter", **lying}), ("blue", held)):
+        document["boxes"].append({"name": name, "size": [0.15, 0.07, 0.1], **fields})
+    file = write_json(folder / "second.json", data.draw(spoilt(document)))
+    scene = answer(lambda: load_scene(file), file)
+    if scene is not None:
+        assert Scene.model_validate_json(scene.model_dump_json()) == scene
 
 
 @examples(200)
