@@ -18,6 +18,7 @@ from guided_lgp.tracking import flatten
 
 ROOT = Path(__file__).parents[2]
 PARAMS = load_params(ROOT / "params.yaml")
+EXTENDING = ROOT / "docs" / "extending.md"
 PAGES = sorted([ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").glob("*.md")])
 
 
@@ -84,11 +85,51 @@ def run_script(script: str, sources: Path | None = None) -> subprocess.Completed
     )
 
 
-def test_the_example_domain_is_one_file(tmp_path: Path) -> None:
-    declaration, script, *_ = blocks(ROOT / "docs/extending.md", "python")
-    file = tmp_path / declaration.splitlines()[0].removeprefix("# ")
-    shutil.copytree(ROOT / "src/guided_lgp", tmp_path / "src/guided_lgp")
+def section(heading: str) -> list[str]:
+    """The blocks of Python in a section of the page on extending."""
+    text = EXTENDING.read_text(encoding="utf-8").partition(f"## {heading}")[2].partition("\n## ")[0]
+    return re.findall(r"^```python\n(.*?)^```", text, flags=re.DOTALL | re.MULTILINE)
+
+
+def copied_sources(folder: Path, declaration: str) -> Path:
+    """The sources with one file more, whose name is in its first line; the sources' package."""
+    shutil.copytree(ROOT / "src/guided_lgp", folder / "src/guided_lgp")
+    file = folder / declaration.splitlines()[0].removeprefix("# ")
+    file.parent.mkdir(exist_ok=True)
     file.write_text(declaration, encoding="utf-8")
+    return folder / "src/guided_lgp"
+
+
+def test_the_example_robot_is_one_file(tmp_path: Path) -> None:
+    (robot,) = blocks(EXTENDING, "yaml")
+    (script,) = section("Another robot")
+    file = tmp_path / robot.splitlines()[0].removeprefix("# ")
+    file.write_text(robot, encoding="utf-8")
+    done = run_script(script.replace(file.name, str(file)))
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == "(grasp ur3 red) (place ur3 red tab2)\n"
+
+
+def test_the_example_planner_is_one_file_and_its_rows(tmp_path: Path) -> None:
+    declaration, entry, row, script = section("Another planner")
+    package = copied_sources(tmp_path, declaration)
+    registry = package / "search" / "planners.py"
+    text = registry.read_text(encoding="utf-8")
+    for begin, line in (
+        ("SEARCHES: Mapping[str, Search] = {\n", entry),
+        ("    for planner in (\n", f"{row.strip()},\n"),
+    ):
+        assert begin in text
+        text = text.replace(begin, begin + line)
+    registry.write_text(text, encoding="utf-8")
+    done = run_script(script, tmp_path / "src")
+    assert done.returncode == 0, done.stderr
+    assert re.fullmatch(r"Weighted A\* \(grasp \S+ red\) \(place \S+ red green\)\n", done.stdout)
+
+
+def test_the_example_domain_is_one_file(tmp_path: Path) -> None:
+    declaration, script = section("Another instruction, another goal: a domain")
+    copied_sources(tmp_path, declaration)
     done = run_script(script, tmp_path / "src")
     assert done.returncode == 0, done.stderr
     assert re.fullmatch(r"\(unstack \S+ red tab1\) \(place \S+ red green\)\n", done.stdout)
@@ -97,11 +138,8 @@ def test_the_example_domain_is_one_file(tmp_path: Path) -> None:
 
 
 def test_the_example_policy_is_one_package(tmp_path: Path) -> None:
-    *_, declaration, script = blocks(ROOT / "docs/extending.md", "python")
-    file = tmp_path / declaration.splitlines()[0].removeprefix("# ")
-    shutil.copytree(ROOT / "src/guided_lgp", tmp_path / "src/guided_lgp")
-    file.parent.mkdir()
-    file.write_text(declaration, encoding="utf-8")
+    declaration, script = section("Another policy")
+    copied_sources(tmp_path, declaration)
     done = run_script(script, tmp_path / "src")
     assert done.returncode == 0, done.stderr
     assert re.fullmatch(r"\(grasp \S+ red\) \(place \S+ red green\)\n", done.stdout)
