@@ -188,6 +188,12 @@ def test_the_table_has_a_row_per_point(
     assert list(dict.fromkeys(row["action"] for row in rows)) == [s.action for s in motion.segments]
 
 
+def test_a_plan_of_no_actions_moves_nothing(plan_file: Path) -> None:
+    nothing = read_plan(plan_file).model_copy(update={"actions": ()})
+    with pytest.raises(InputError, match="its goals hold at the start"):
+        motion_of(nothing)
+
+
 def test_what_cannot_be_written_is_one_line(plan_file: Path, tmp_path: Path) -> None:
     plan = read_plan(plan_file)
     with pytest.raises(InputError, match="suffix"):

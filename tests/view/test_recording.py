@@ -36,7 +36,7 @@ def moving(file: Path, entity: str) -> pa.Table:
 
 def test_bodies_and_joints_are_where_the_plan_has_them(scene: Scene, tmp_path: Path) -> None:
     trajectory = outputs.motion("red")
-    write_recording(trajectory, scene, tmp_path / "plan.rrd")
+    write_recording(trajectory, scene, tmp_path / "plan.rrd")  # of no actions, as it were
     shown = frames(scene, trajectory)
     table = moving(tmp_path / "plan.rrd", "/boxes/red").sort_by(TIMELINE)
     nanoseconds = np.array(table[TIMELINE].cast(pa.int64()))

@@ -96,11 +96,13 @@ def motion_of(plan: Plan, speed: float = 1.0) -> Motion:
         speed: share of the robot's speed, in (0, 1]; accelerations fall with its square.
 
     Raises:
-        InputError: the speed is out of range, or its attachments are not those of its
-            actions.
+        InputError: the speed is out of range, the plan has no actions, or its attachments are
+            not those of its actions.
     """
     if not 0.0 < speed <= 1.0:
         raise InputError("speed", f"{speed} is out of range", "a share in (0, 1]")
+    if not plan.actions:
+        raise InputError("plan", "has no actions: its goals hold at the start")
     robot, trajectory = plan.scene.robot.description, plan.trajectory
     switches = switches_of(plan.scene, plan.skeleton, trajectory)
     if not isinstance(switches, list):

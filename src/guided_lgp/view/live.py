@@ -42,7 +42,7 @@ def view(
     with Viewer(scene, port) as viewer, suppress(KeyboardInterrupt):
         player = None
         if trajectory is not None:
-            listed = steps(scene, skeleton, trajectory)
+            listed = steps(scene, skeleton, trajectory) if skeleton else []
             player = _Player(viewer, frames(scene, trajectory), listed, objective)
         announce(f"http://127.0.0.1:{viewer.server.get_port()}")
         while not stop.wait(1.0 / FRAME_RATE):

@@ -49,7 +49,7 @@ def write_recording(
         for frame in frames(scene, trajectory):
             stream.set_time(TIMELINE, duration=frame.time)
             show(stage, frame)
-        for step in steps(scene, skeleton, trajectory):
+        for step in steps(scene, skeleton, trajectory) if skeleton else ():
             stream.set_time(TIMELINE, duration=step.time)
             stream.log(PLAN, rerun.TextLog(step.text))
         stream.disconnect()
