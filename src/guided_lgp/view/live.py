@@ -11,6 +11,7 @@ import numpy as np
 from guided_lgp.bounds.results import Trajectory
 from guided_lgp.logic import Objective, Skeleton, format_objective
 from guided_lgp.scene.model import Scene
+from guided_lgp.scene.world import initial_poses
 from guided_lgp.view.motion import FRAME_RATE, Frame, Step, frames, show, steps
 from guided_lgp.view.viewer import Viewer
 
@@ -30,7 +31,7 @@ def view(
     """Serve a scene on the loopback interface until interrupted (Ctrl-C).
 
     Args:
-        scene: the scene to show, all arms at their side.
+        scene: the scene to show, as it is at the start.
         trajectory: a motion that starts in the scene; it is played over and over, with controls.
         port: TCP port on 127.0.0.1; the next free one is taken if it is in use.
         announce: is given the address to open.
@@ -40,6 +41,8 @@ def view(
     """
     stop = stop or Event()
     with Viewer(scene, port) as viewer, suppress(KeyboardInterrupt):
+        for name, placement in initial_poses(scene).items():  # also of what is in a hand
+            viewer.move_box(name, placement)
         player = None
         if trajectory is not None:
             listed = steps(scene, skeleton, trajectory) if skeleton else []
