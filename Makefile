@@ -8,7 +8,7 @@ INSTALLED := $(VENV)/.installed
 export PATH := $(BIN):$(PATH)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: setup ship quick repro study cases test lint bench mlflow verify-determinism verify-interruption verify-load verify-hostile sources
+.PHONY: setup ship quick repro study cases test lint bench open-world mlflow verify-determinism verify-interruption verify-load verify-hostile sources
 
 setup: $(INSTALLED)
 
@@ -68,6 +68,10 @@ lint: setup
 bench: setup
 	dvc repro -q generate_scenes
 	python benchmarks/run.py
+
+# 300 generated scenes of ten kinds, with and without a plan, whose truth is known: minutes.
+open-world: setup
+	python benchmarks/open_world.py
 
 # The small profile with one worker, with two and on Dask, compared byte by byte.
 verify-determinism: setup
