@@ -11,6 +11,7 @@ from guided_lgp.cases import collect, demonstrate, train
 from guided_lgp.cases.declared import declared_case
 from guided_lgp.cases.policies import FULL, SHUFFLED, SIGHTS, models_of
 from guided_lgp.cases.shards import run_kept
+from guided_lgp.documents import read_json
 from guided_lgp.domains import load_domain
 from guided_lgp.errors import InputError
 from guided_lgp.logic import applicable_actions
@@ -147,6 +148,7 @@ def test_figures() -> None:
         "trainings": 2,
         "problems": 4,
         "solved": 3,
+        "solved_within_2k": 3,
         "solved_min": 1,
         "calls_mean": 6.0,
         "infeasible_calls_mean": 1.0,
@@ -157,3 +159,17 @@ def test_figures() -> None:
         "path_verified_share": 0.5,
         "physics_share": 1.0,
     }
+
+
+@pytest.mark.parametrize("name", PARAMS.cases)
+def test_the_figures_in_git_follow_from_the_rows_in_git(name: str) -> None:
+    rows = collect.read_rows(ROOT, name, PARAMS.cases[name])
+    written = read_json(ROOT / collect.RESULTS, "make cases")[name]
+    assert collect.by_cell({name: rows}, collect.figures)[name] == written
+    assert collect.compared(rows) == read_json(ROOT / collect.COMPARED, "make cases")[name]
+    for size in map(str, PARAMS.cases[name].evaluation.sizes):
+        assert set(written[size]) >= {
+            *("no_policy", "facts", "facts_tuned", "conflicts", "astar"),
+            *("relational", "relational_best_first"),
+        }
+        assert written[size]["relational"]["trainings"] == len(PARAMS.cases[name].seeds)

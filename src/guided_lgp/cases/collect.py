@@ -68,8 +68,9 @@ def by_cell(rows: Mapping[str, Sequence[Row]], summary: Callable[[list[Row]], Ro
 def figures(cell: list[Row]) -> Row:
     """What one planner did on the problems of one size.
 
-    ``problems`` is scenes times trainings, ``solved_min`` the number of the worst training. Means
-    of calls are over the solved; ``calls_limited_mean`` is over all, with the limit for the others.
+    ``problems`` is scenes times trainings, ``solved_within_2k`` those with at most two calls per
+    action of the plan, ``solved_min`` the number of the worst training. Means of calls are over the
+    solved; ``calls_limited_mean`` is over all, with the limit for the others.
     """
     trainings: dict[str, list[Row]] = {}
     for row in cell:
@@ -80,6 +81,7 @@ def figures(cell: list[Row]) -> Row:
         "trainings": len(trainings),
         "problems": len(cell),
         "solved": len(solved),
+        "solved_within_2k": sum(row["coarse_calls"] <= 2 * row["length"] for row in solved),
         "solved_min": min(sum(row["solved"] for row in rows) for rows in trainings.values()),
         "calls_mean": _mean(row["coarse_calls"] for row in solved),
         "infeasible_calls_mean": _mean(row["infeasible_calls"] for row in solved),
