@@ -1,11 +1,13 @@
 """Take the pipeline's trained weights and limits into the package (``make ship``)."""
 
+import shutil
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from guided_lgp.documents import copy_whole, read_json, write_text
+from guided_lgp.documents import read_json, write_text, written_whole
 from guided_lgp.params import Params, PlanningParams, load_params
 from guided_lgp.paths import METRICS, MODELS, PARAMS, PLANNING, TRAINED
 from guided_lgp.policy.declaration import PolicyDeclaration
@@ -30,10 +32,20 @@ def ship(root: Path, models: Path = MODELS, limits: Path = PLANNING) -> None:
     """
     params = load_params(root / PARAMS)
     metrics = read_json(root / METRICS / "generalization.json", "the output of the pipeline")
-    copy_whole(root / TRAINED, models)
+    for name in _weights():  # cases have policies of their own beside these
+        with written_whole(models / name) as unfinished:
+            shutil.copyfile(root / TRAINED / name, unfinished)
     write_text(models / CARD, model_card(params, metrics))
     planning = params.model_dump(include=set(PlanningParams.model_fields))
     write_text(limits, _HEADING + yaml.safe_dump(planning, sort_keys=True))
+
+
+def _weights() -> Iterator[Path]:
+    """The files of all trained policies, in a folder of models."""
+    for policy in TRAINED_POLICIES.values():
+        for network in policy.networks:
+            yield Path(policy.folder, f"{network}.json")
+            yield Path(policy.folder, f"{network}.safetensors")
 
 
 def model_card(params: Params, metrics: dict[str, Any]) -> str:
