@@ -8,7 +8,7 @@ INSTALLED := $(VENV)/.installed
 export PATH := $(BIN):$(PATH)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: setup ship quick repro study cases test lint bench open-world mlflow verify-determinism verify-interruption verify-load verify-hostile sources
+.PHONY: setup ship quick repro study cases test lint bench open-world mlflow verify-determinism verify-interruption verify-load verify-hostile sources reach
 
 setup: $(INSTALLED)
 
@@ -72,6 +72,9 @@ bench: setup
 # 300 generated scenes of ten kinds, with and without a plan, whose truth is known: minutes.
 open-world: setup
 	python benchmarks/open_world.py
+# Random sequences with the other robots and with hand-overs, planned and carried out.
+reach: setup
+	python benchmarks/robots.py
 
 # The small profile with one worker, with two and on Dask, compared byte by byte.
 verify-determinism: setup

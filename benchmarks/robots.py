@@ -1,14 +1,20 @@
-"""Benchmark of other robots: random sequences that are coarse-feasible, planned and carried out.
+"""How far other robots and the hand-over get: random sequences, planned and carried out.
 
-Needs nothing that the pipeline makes: python benchmarks/robots.py ROBOT [K] [sequences]
+Writes ``reports/metrics/reach.json``, after every part, and needs nothing that the pipeline makes:
+
+    python benchmarks/robots.py [PART ...]
+
+With parts named, the figures of the others stay.
 """
 
-import json
+import logging
 import sys
 import time
-from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from itertools import combinations
+from functools import partial
+from itertools import combinations, count
+from pathlib import Path
 from statistics import median
 from typing import Any
 
@@ -16,16 +22,22 @@ import numpy as np
 
 from guided_lgp.bounds.execution import execute
 from guided_lgp.bounds.scene_bounds import SceneBounds
-from guided_lgp.logic import Skeleton, applicable_actions, successor
+from guided_lgp.documents import read_json, write_json
+from guided_lgp.logic import Skeleton, applicable_actions, format_skeleton, successor
 from guided_lgp.params import load_params
-from guided_lgp.paths import SOURCES
-from guided_lgp.scene import Box, PlacedRobot, Scene, Table
+from guided_lgp.paths import METRICS, SOURCES
+from guided_lgp.scene import Box, PlacedRobot, Scene, Table, generate
 from guided_lgp.scene.footprints import footprint, gap, inset
 from path import goals_after
 
 SEED = 20_000
 PER_SCENE = 5
 """Sequences per scene."""
+FILE = Path(__file__).parents[1] / METRICS / "reach.json"
+NO_PATH, FAILS, HOLDS = "no path", "goals do not hold", "goals hold"
+"""What may become of a coarse-feasible sequence: the last one after its execution in physics."""
+
+logger = logging.getLogger("reach")
 
 
 @dataclass(frozen=True)
@@ -89,57 +101,100 @@ def _box(family: Family, name: str, rng: np.random.Generator) -> Box:
     return Box(name=name, size=family.box_size, position=position, yaw=yaw, on=table.name)
 
 
-def measure(robot: str, length: int, count: int) -> dict[str, Any]:
-    """What becomes of random sequences of one length."""
-    outcomes: Counter[str] = Counter()
+@dataclass(frozen=True)
+class Part:
+    """Random sequences of a kind."""
+
+    scene: Callable[[int], Scene]
+    """By number."""
+    wanted: int
+    """How many that are coarse-feasible."""
+    length: int = 2
+    instructions: tuple[str, ...] = ()
+    """Of their actions, if not any."""
+
+    def sequences(self) -> Iterator[tuple[SceneBounds, Skeleton]]:
+        """The sequences, in their order: the same for everyone."""
+        for index in count():
+            scene = self.scene(index)
+            bounds = SceneBounds(scene, load_params(SOURCES / "params.yaml").bounds)
+            rng = np.random.default_rng([SEED, self.length, index])
+            for _ in range(PER_SCENE):
+                yield bounds, self._drawn(scene, rng)
+
+    def _drawn(self, scene: Scene, rng: np.random.Generator) -> Skeleton:
+        state, skeleton = scene.state, ()
+        for step in range(self.length):
+            wanted = self.instructions[step : step + 1]
+            actions = [
+                action
+                for action in applicable_actions(state, scene.symbols)
+                if not wanted or action.instruction in wanted
+            ]
+            skeleton = (*skeleton, actions[int(rng.integers(len(actions)))])
+            state = successor(state, skeleton[-1])
+        return skeleton
+
+
+def handed_over(index: int) -> Scene:
+    """A scene of setup a for hand-overs."""
+    (scene,) = generate("a", 1, SEED + index, f"handover-{index:03d}").scenes
+    return scene.model_copy(update={"domain": "handover"})
+
+
+PARTS: Mapping[str, Part] = {
+    "panda_2": Part(partial(draw, "panda"), 100),
+    "panda_4": Part(partial(draw, "panda"), 100, length=4),
+    "ur5_2": Part(partial(draw, "ur5"), 50),
+    "baxter_2": Part(partial(draw, "baxter"), 10),
+    "handover": Part(handed_over, 40, length=3, instructions=("grasp", "take", "place")),
+}
+
+
+def measure(part: Part) -> dict[str, Any]:
+    """What becomes of the first coarse-feasible sequences."""
+    rows: list[tuple[str, str, str]] = []
     times: list[float] = []
-    for index in range(-(-count // PER_SCENE)):
-        scene = draw(robot, index)
-        bounds = SceneBounds(scene, load_params(SOURCES / "params.yaml").bounds)
-        rng = np.random.default_rng([SEED, length, index])
-        for _ in range(min(PER_SCENE, count - index * PER_SCENE)):
-            skeleton = _random(scene, length, rng)
+    tried = 0
+    for bounds, skeleton in part.sequences():
+        if len(rows) == part.wanted:
+            break
+        tried += 1
+        if bounds.coarse(skeleton).feasible:
             began = time.perf_counter()
-            outcome = _outcome(scene, bounds, skeleton)
+            rows.append((bounds.scene.name, format_skeleton(skeleton), outcome(bounds, skeleton)))
             times.append(time.perf_counter() - began)
-            outcomes.update(outcome)
-    feasible, verified = outcomes["feasible"], outcomes["verified"]
+    outcomes = [row[-1] for row in rows]
     return {
-        "robot": robot,
-        "length": length,
-        "n": count,
-        "coarse_feasible_share": feasible / count,
-        "path_verified_share": verified / max(feasible, 1),
-        "physics_success_share": outcomes["executed"] / max(verified, 1),
-        "median_s": median(times),
+        "tried": tried,
+        "coarse_feasible": len(rows),
+        "verified": len(rows) - outcomes.count(NO_PATH),
+        "goals_hold": outcomes.count(HOLDS),
+        "path_and_physics_median_s": round(median(times), 2),
+        "rows": rows,
     }
 
 
-def _outcome(scene: Scene, bounds: SceneBounds, skeleton: Skeleton) -> list[str]:
-    coarse = bounds.coarse(skeleton)
-    if not coarse.feasible:
-        return []
+def outcome(bounds: SceneBounds, skeleton: Skeleton) -> str:
+    """What becomes of a coarse-feasible sequence."""
     result = bounds.path(skeleton)
     if result.trajectory is None:
-        print(f"{scene.name} {' '.join(map(str, skeleton))}: {result.failure}", file=sys.stderr)
-        return ["feasible"]
-    goals = goals_after(scene.state, skeleton)
-    report = execute(scene, goals, skeleton, result.trajectory)
-    if not report.success:
-        print(f"{scene.name} {' '.join(map(str, skeleton))}: {report}", file=sys.stderr)
-    return ["feasible", "verified", *(["executed"] if report.success else [])]
+        logger.info("%s %s: %s", bounds.scene.name, format_skeleton(skeleton), result.failure)
+        return NO_PATH
+    goals = goals_after(bounds.scene.state, skeleton)
+    report = execute(bounds.scene, goals, skeleton, result.trajectory)
+    return HOLDS if report.success else FAILS
 
 
-def _random(scene: Scene, length: int, rng: np.random.Generator) -> Skeleton:
-    state, skeleton = scene.state, ()
-    for _ in range(length):
-        actions = list(applicable_actions(state, scene.symbols))
-        skeleton = (*skeleton, actions[int(rng.integers(len(actions)))])
-        state = successor(state, skeleton[-1])
-    return skeleton
+def main(names: list[str]) -> None:
+    """Measure some parts, or all."""
+    figures = read_json(FILE, "an earlier run of all parts") if names else {}
+    for name in names or PARTS:
+        figures[name] = measure(PARTS[name])
+        logger.info("%s: %s", name, {k: v for k, v in figures[name].items() if k != "rows"})
+        write_json(FILE, figures)
 
 
 if __name__ == "__main__":
-    name, lengths = sys.argv[1], [int(sys.argv[2])] if len(sys.argv) > 2 else [2, 4]
-    number = int(sys.argv[3]) if len(sys.argv) > 3 else 100
-    print(json.dumps([measure(name, length, number) for length in lengths], indent=1))
+    logging.basicConfig(format="%(message)s", level=logging.INFO)
+    main(sys.argv[1:])

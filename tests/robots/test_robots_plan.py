@@ -11,7 +11,8 @@ from guided_lgp.bounds.execution import execute
 from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.logic import parse_objective, parse_skeleton
 from guided_lgp.params import load_params
-from guided_lgp.paths import SOURCES
+from guided_lgp.paths import EXAMPLES, SOURCES
+from guided_lgp.planning import plan
 from guided_lgp.robots import load_robot, robot_names
 from guided_lgp.scene import Box, PlacedRobot, Scene, Table
 from guided_lgp.scene.validate import validate_scene
@@ -98,3 +99,13 @@ def test_what_a_file_states_goes_before_what_is_derived(tmp_path: Path) -> None:
     assert arm.hand_radius == 0.2
     assert arm.lever_arms.tolist() == [1.0] * 7
     assert arm.palm_front == derived.palm_front
+
+
+def test_a_policy_trained_with_one_robot_guides_another() -> None:
+    """Greedy: four actions, and no more nodes than their children."""
+    goals = ["(on blue green)", "(on red blue)"]
+    result = plan(EXAMPLES / "panda.json", goals, "guided", policy="relational")
+    assert result.solved, result.explanation
+    assert result.skeleton is not None
+    assert len(result.skeleton) == 4
+    assert result.tree_size < 30
