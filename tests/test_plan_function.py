@@ -88,6 +88,23 @@ def test_a_sequence_asked_twice_counts_once() -> None:
     assert bounds.obstacles(START, OBJECTIVE)[0].sequences == 1
 
 
+def test_what_goes_on_where_a_path_has_failed_is_put_off_and_taken_up() -> None:
+    failed = parse_skeleton("(grasp pr2R red) (place pr2R red green)")
+    onwards = parse_skeleton("(grasp pr2R red) (place pr2R red tab1)")
+    blocked = Failure(0, "clear r_gripper_palm_link green", float("nan"), "")
+    bounds = ObservedBounds(Verdicts({}, {"(grasp pr2R red) (place pr2R red green)": blocked}))
+    assert bounds.coarse(onwards).feasible
+    assert not bounds.path(failed).feasible
+    assert not bounds.take_up()  # nothing has been asked that would go on from there
+    bounds.path(failed)
+    assert bounds.coarse(onwards[:1]).feasible  # the beginning itself is as it was
+    verdict = bounds.coarse(onwards)
+    assert (verdict.feasible, verdict.failure) == (False, blocked)
+    assert bounds.take_up()
+    assert bounds.coarse(onwards).feasible
+    assert not bounds.take_up()
+
+
 @pytest.mark.parametrize(
     ("name", "goals", "nodes"),
     [

@@ -51,20 +51,43 @@ class Obstacle:
 
 
 class ObservedBounds:
-    """The bounds of a scene as one search uses them; keeps what stopped its sequences."""
+    """The bounds of a scene as one search uses them; keeps what stopped its sequences.
+
+    Where a path has failed at an action, whatever goes on from there is put off: it would most
+    likely fail again, after seconds. A search that has found nothing without it, takes it up.
+    """
 
     def __init__(self, bounds: Bounds) -> None:
         self._bounds = bounds
         self._coarse: dict[Skeleton, CoarseResult] = {}
         self._path: dict[Skeleton, PathResult] = {}
+        self._stuck: dict[Skeleton, Failure] = {}
+        """Beginnings of sequences at whose last action a path has failed."""
+        self._put_off = False
 
     def coarse(self, skeleton: Skeleton) -> CoarseResult:
         """See :class:`guided_lgp.search.bounds.Bounds`."""
+        if (failure := self._stuck_before(skeleton)) is not None:
+            self._put_off = True
+            return CoarseResult(skeleton, feasible=False, failure=failure, restarts=0)
         return self._coarse.setdefault(skeleton, self._bounds.coarse(skeleton))
 
     def path(self, skeleton: Skeleton) -> PathResult:
         """See :class:`guided_lgp.search.bounds.Bounds`."""
-        return self._path.setdefault(skeleton, self._bounds.path(skeleton))
+        result = self._path.setdefault(skeleton, self._bounds.path(skeleton))
+        if result.failure is not None:
+            self._stuck[skeleton[: result.failure.action + 1]] = result.failure
+        return result
+
+    def take_up(self) -> bool:
+        """Put nothing off that has been; whether there was something."""
+        some, self._put_off = self._put_off, False
+        self._stuck.clear()
+        return some
+
+    def _stuck_before(self, skeleton: Skeleton) -> Failure | None:
+        beginnings = (skeleton[:length] for length in range(1, len(skeleton)))
+        return next((self._stuck[part] for part in beginnings if part in self._stuck), None)
 
     @property
     def starts(self) -> int:

@@ -50,7 +50,7 @@ from guided_lgp.search.planners import (
 )
 from guided_lgp.search.policy import Policy
 from guided_lgp.search.problem import Problem
-from guided_lgp.search.result import REASONS, Cause, Run, SearchResult, Times
+from guided_lgp.search.result import REASONS, Cause, Run, SearchResult, Times, joined
 from guided_lgp.search.ways import widened_scene
 
 SEQUENCES_PER_ACTION = 100
@@ -191,7 +191,10 @@ def plan(
         return attempts.result(_only_timed(problem))
     if not chosen:
         problem = replace(problem, widened=partial(attempts.widened, params.bounds))
-    return attempts.result(search.plan(problem))
+    found = search.plan(problem)
+    if not found.solved and not deadline.passed and attempts.take_up():
+        found = joined(found, search.plan(problem))
+    return attempts.result(found)
 
 
 def _only_timed(problem: Problem) -> SearchResult:
@@ -209,6 +212,8 @@ class _Attempts:
     def widened(self, params: BoundsParams) -> Problem | None:
         """The problem with further instructions, if a goal needs them; no policy knows these."""
         problem = self.first
+        if self._last is not problem:
+            return self._last
         scene = widened_scene(problem.scene, problem.objective, params, problem.deadline)
         if scene is None:
             return None
@@ -217,10 +222,14 @@ class _Attempts:
         self._last = replace(problem, scene=scene, bounds=observed, parts=bounds, policy=Uniform())
         return self._last
 
+    def take_up(self) -> bool:
+        """Whether sequences have been put off: another search may look at them."""
+        put_off = [_observed(problem).take_up() for problem in (self.first, self._last)]
+        return any(put_off)
+
     def result(self, found: SearchResult) -> PlanningResult:
         """What the searches have found, with what stopped the sequences of the last one."""
-        problem, bounds = self._last, self._last.bounds
-        assert isinstance(bounds, ObservedBounds)
+        problem, bounds = self._last, _observed(self._last)
         obstacles = bounds.obstacles(problem.scene.state, problem.objective)
         return PlanningResult(
             **vars(found),
@@ -230,6 +239,11 @@ class _Attempts:
             obstacles=() if found.solved else obstacles,
             finding=None if found.solved else _finding(problem, obstacles),
         )
+
+
+def _observed(problem: Problem) -> ObservedBounds:
+    assert isinstance(problem.bounds, ObservedBounds)
+    return problem.bounds
 
 
 def _finding(problem: Problem, obstacles: Sequence[Obstacle]) -> Finding | None:
