@@ -219,6 +219,13 @@ def test_the_sources_use_nothing_newer_than_the_oldest_python() -> None:
         assert names.isdisjoint(newer | {"tomllib"}), file
 
 
+def test_every_extra_is_explained() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    page = (ROOT / "docs/index.md").read_text(encoding="utf-8")
+    for extra in project["optional-dependencies"].keys() - {"test", "lint"}:
+        assert f"| `{extra}` |" in page, extra
+
+
 def test_the_version_is_said_once() -> None:
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
     assert citation["version"] == __version__ == metadata.version("guided-lgp")
