@@ -164,6 +164,10 @@ def test_pages_hold_the_tables_and_the_findings(rendered: Path, tmp_path: Path) 
     results = (tmp_path / "clone/docs/results.md").read_text()
     assert results.count("**Table I") >= 3
     assert "K = 20: e.10" in results
+    assert "crowded rows" not in text
+    write_json(tmp_path / "clone/reports/cases_compared.json", outputs.cases_compared())
+    write_pages(tmp_path / "clone")
+    assert "needs 6.5, 6.5 calls" in readme.read_text()
     readme.write_text("# Title\n")
     with pytest.raises(InputError, match="markers"):
         write_pages(tmp_path / "clone")

@@ -9,7 +9,7 @@ from guided_lgp.report import paper
 from guided_lgp.report.cells import NONE
 from guided_lgp.report.drawing import save
 from guided_lgp.report.findings import many, pair, tree
-from guided_lgp.report.metrics import Metrics, read_evaluations
+from guided_lgp.report.metrics import COMPARED, Metrics, read_evaluations, read_metrics
 from guided_lgp.report.scalability_figures import solved
 from guided_lgp.report.style import POLICIES
 from guided_lgp.search.planners import BEST, CONTROL, PAPERS, TABLE_1
@@ -20,14 +20,14 @@ RESULTS = Path("docs/results.md")
 IMAGES = Path("docs/images")
 TABLES = ("winners", "table_1", "table_3_tree_size", "table_3_time", "table_3_details", "training")
 """Files of ``reports/tables`` that the page of results has."""
-OPTIONAL = ("draws", "unseen", "enumeration", "geometry")
-"""Those that are there once ``make study`` and ``make bench`` have run."""
+OPTIONAL = ("case_rows", "case_rows_decoys", "draws", "unseen", "enumeration", "geometry")
+"""Those that are there once ``make cases``, ``make study`` and ``make bench`` have run."""
 _INTRODUCTION = """\
 # Results
 
 Written by `make repro` from `reports/`; the whole report, with figures and 3D replays, is
 `reports/report.html`. [Where and why this differs from the paper](differences.md) ·
-[benchmarks](benchmarks.md) · [studies](studies.md)
+[benchmarks](benchmarks.md) · [studies](studies.md) · [cases](cases.md)
 
 ![Share of problems solved against the number of actions](images/solved.png)
 """
@@ -47,7 +47,9 @@ def write_pages(root: Path) -> None:
     (root / IMAGES).mkdir(parents=True, exist_ok=True)
     save(solved(metrics), root / IMAGES, "solved")
     write_text(root / RESULTS, "\n".join([_INTRODUCTION, *_tables(root)]))
-    _replace(root / "README.md", findings(metrics, timing, shares))
+    rows = root / REPORTS / "cases_compared.json"
+    compared = read_metrics(rows, "make cases", COMPARED) if rows.is_file() else {}
+    _replace(root / "README.md", findings(metrics, timing, shares, compared))
 
 
 def _tables(root: Path) -> list[str]:
@@ -70,7 +72,7 @@ def _replace(readme: Path, block: str) -> None:
     write_text(readme, f"{before}{begin}\n\n{block}\n{end}{after}")
 
 
-def findings(metrics: Metrics, timing: Metrics, shares: Metrics) -> str:
+def findings(metrics: Metrics, timing: Metrics, shares: Metrics, cases: Metrics) -> str:
     """Three findings for the README, each a bold statement with the figures beside it."""
     return "\n".join(
         [
@@ -84,8 +86,26 @@ def findings(metrics: Metrics, timing: Metrics, shares: Metrics) -> str:
             "",
             f"![Share of problems solved against the number of actions]({IMAGES}/solved.png)",
             "",
+            *_rows(cases.get("rows", {})),
         ]
     )
+
+
+def _rows(sizes: Metrics) -> list[str]:
+    """What learning is worth where geometry decides, once ``make cases`` has run."""
+    if not sizes:
+        return []
+    compared = [one["with_facts"] for one in sizes.values()]
+    ours, rivals = (", ".join(f"{one[key]:.1f}" for one in compared) for key in _CALLS)
+    return [
+        "Where geometry decides, as in [crowded rows](docs/cases.md), a policy trained on three "
+        f"boxes needs {ours} calls of the coarse bound to a plan of {', '.join(sizes)} boxes, the "
+        f"best search without learning {rivals}.",
+        "",
+    ]
+
+
+_CALLS = ("calls", "rival_calls")
 
 
 def _shares(shares: Metrics) -> list[str]:
