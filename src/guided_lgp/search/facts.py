@@ -103,7 +103,7 @@ class TaskFacts:
         conflicts = Conflicts(self.scene, self._bounds)
         conflicts.learn(skeleton)
         (found,) = conflicts.found
-        if found.boxes == set(self._boxes):
+        if found.boxes >= set(self._boxes):
             return None
         names = " and ".join(name for name in self._boxes if name in found.boxes)
         actions = format_skeleton(found.actions)
