@@ -49,7 +49,7 @@ study: setup
 	dvc repro -f -s render_reports
 	python -m guided_lgp.report.pages
 
-# Families of problems where geometry decides, with policies of their own: half an hour. The report
+# Families of problems where geometry decides, with policies of their own: an hour. The report
 # shows their results without depending on them.
 cases: setup
 	dvc repro cases/dvc.yaml

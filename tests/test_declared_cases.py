@@ -18,6 +18,7 @@ from guided_lgp.logic import applicable_actions
 from guided_lgp.params import Parallel, Params, load_params
 from guided_lgp.policy.relational.inference import load_relational
 from guided_lgp.policy.relational.samples import Examples
+from guided_lgp.policy.tensors import write_tensors
 
 ROOT = Path(__file__).parents[1]
 PARAMS = load_params(ROOT / "params.yaml")
@@ -93,9 +94,9 @@ def test_labels_are_disjoint_and_applicable(rows: list[dict[str, Any]]) -> None:
 
 
 def test_a_policy_of_each_kind_is_trained(rows: list[dict[str, Any]], tmp_path: Path) -> None:
-    arrays = demonstrate._arrays([row | {"configuration": i % 3} for i, row in enumerate(rows * 3)])
+    labelled = [row | {"configuration": i % 3} for i, row in enumerate(rows * 3)]
     file = tmp_path / "data" / "rows" / "demonstrations.safetensors"
-    demonstrate.write_tensors(file, arrays)
+    write_tensors(file, demonstrate.label_arrays(labelled, 2))
     quick = PARAMS.cases["rows"].training.model_copy(update={"epochs": 1, "width": 8})
     params = changed(training=quick, seeds=(7,)).model_copy(
         update={"parallel": Parallel(backend="loky", workers=1)}

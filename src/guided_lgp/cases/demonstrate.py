@@ -33,6 +33,7 @@ from guided_lgp.params import BoundsParams, Params, SearchLimits
 from guided_lgp.policy.relational.encoding import situation
 from guided_lgp.policy.relational.heads import heads
 from guided_lgp.policy.tensors import write_tensors
+from guided_lgp.robots import load_robot
 from guided_lgp.scene import Scene
 from guided_lgp.search import best_first
 from guided_lgp.search.informed import FactsOfPairs
@@ -78,7 +79,8 @@ def run(params: Params, root: Path, name: str) -> None:
         demonstrate, tasks, folder / ".demonstrations", params.parallel, f"{name}: demonstrations"
     )
     rows = [row for part in parts for row in part]
-    write_tensors(demonstrations_of(root, name), _arrays(rows))
+    grippers = len(load_robot(case.params.robot).grippers)
+    write_tensors(demonstrations_of(root, name), label_arrays(rows, grippers))
     logger.info("%s: %d states of %d scenes", name, len(rows), len(parts))
 
 
@@ -198,8 +200,8 @@ def _place(scene: Scene, action: Action) -> tuple[int, int]:
     return symbols.grippers.index(action.symbols[0]), symbols.tables.index(target)
 
 
-def _arrays(rows: list[Row]) -> dict[str, np.ndarray]:
-    grippers = 2
+def label_arrays(rows: list[Row], grippers: int) -> dict[str, np.ndarray]:
+    """The labelled states as arrays; actions by gripper and node, as the policy scores them."""
     nodes = len(rows[0]["positions"])
     labels = {
         name: np.zeros((len(rows), grippers, nodes), dtype=bool) for name in ("right", "wrong")

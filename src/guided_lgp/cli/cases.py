@@ -31,7 +31,13 @@ def demonstrate(case: CaseName, params: ParamsFile = PARAMS, timeout: TimeLimit 
     """
     from guided_lgp.cases import demonstrate
 
-    _run("demonstrate", case, lambda root, read: demonstrate.run(read, root, case), params, timeout)
+    _run(
+        f"demonstrate@{case}",
+        case,
+        lambda root, read: demonstrate.run(read, root, case),
+        params,
+        timeout,
+    )
 
 
 @app.command("train_case")
@@ -48,7 +54,7 @@ def train_case(
     from guided_lgp.cases import train
 
     _run(
-        f"train_case@{seed}",
+        f"train_case@{case}-{seed}",
         case,
         lambda root, read: train.run(read, root, case, seed),
         params,
@@ -69,13 +75,10 @@ def evaluate_case(
     """
     from guided_lgp.cases import evaluate
 
-    _run(
-        f"evaluate_case@{training}",
-        case,
-        lambda root, read: evaluate.run(read, root, case, training),
-        params,
-        timeout,
-    )
+    def work(root: Path, read: "Params") -> None:
+        evaluate.run(read, root, case, training)
+
+    _run(f"evaluate_case@{case}-{training}", case, work, params, timeout)
 
 
 @app.command("replay_case")
@@ -86,38 +89,42 @@ def replay_case(case: CaseName, params: ParamsFile = PARAMS, timeout: TimeLimit 
     """
     from guided_lgp.cases import replay
 
-    _run("replay_case", case, lambda root, read: replay.run(read, root, case), params, timeout)
+    _run(
+        f"replay_case@{case}",
+        case,
+        lambda root, read: replay.run(read, root, case),
+        params,
+        timeout,
+    )
 
 
 @app.command("collect_cases")
-def collect_cases(params: ParamsFile = PARAMS) -> None:
+def collect_cases(params: ParamsFile = PARAMS, timeout: TimeLimit = None) -> None:
     """Put the figures of all cases together. Writes reports/cases.json.
 
     Example: guided-lgp collect_cases
     """
     from guided_lgp.cases import collect
-    from guided_lgp.params import load_params
 
-    end_with_dvc()
-    collect.run(load_params(params), Path.cwd())
+    _run("collect_cases", None, lambda root, read: collect.run(read, root), params, timeout)
 
 
 def _run(
     stage: str,
-    case: str,
+    case: str | None,
     work: "Callable[[Path, Params], None]",
     params_file: Path,
     timeout: float | None,
 ) -> None:
-    """Check the parameters and the case, then run a stage, and record it."""
+    """Check the parameters and the case, all of them for None, run a stage, and record it."""
     from guided_lgp import tracking
     from guided_lgp.cases.declared import declared_case
     from guided_lgp.params import load_params
 
     end_with_dvc()
     params, root = load_params(params_file), Path.cwd()
-    declared_case(params, case)
-    name, _, training = stage.partition("@")
-    address = f"{FILE}:{name}@{'-'.join(filter(None, (case, training)))}"
+    for name in params.cases if case is None else [case]:
+        declared_case(params, name)
+    address = f"{FILE}:{stage}"
     with within(timeout, address), alone(root, address), tracking.recorded(address, params):
         work(root, params)
