@@ -72,6 +72,7 @@ bench: setup
 # 300 generated scenes of ten kinds, with and without a plan, whose truth is known: minutes.
 open-world: setup
 	python benchmarks/open_world.py
+
 # Random sequences with the other robots and with hand-overs, planned and carried out.
 reach: setup
 	python benchmarks/robots.py
