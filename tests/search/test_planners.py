@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 from scripted import UNIFORM, ScriptedBounds
 
+from guided_lgp.cases.policies import SIGHTS
 from guided_lgp.errors import InputError
 from guided_lgp.logic import parse_objective, progress, satisfied
 from guided_lgp.params import SearchLimits
@@ -12,7 +13,14 @@ from guided_lgp.policy.registry import POLICIES
 from guided_lgp.report.style import planner_style
 from guided_lgp.scene.model import Scene
 from guided_lgp.search import planners
-from guided_lgp.search.planners import PLANNERS, SEARCHES, TABLE_1, TABLE_3, check_planners
+from guided_lgp.search.planners import (
+    CASE_PLANNERS,
+    PLANNERS,
+    SEARCHES,
+    TABLE_1,
+    TABLE_3,
+    check_planners,
+)
 from guided_lgp.search.problem import Problem
 
 OBJECTIVE = parse_objective(["(on red tab2)"])
@@ -34,6 +42,14 @@ def test_every_row_is_whole(name: str) -> None:
     assert (planner.table_1 in TABLE_1) == bool(planner.table_1)
     if planner.table_3:
         assert planner_style(planner)["color"].startswith("#")
+
+
+def test_rows_of_cases_name_what_there_is() -> None:
+    for name, row in CASE_PLANNERS.items():
+        assert row.name == name
+        assert SEARCHES[row.search].follows_policy == bool(row.policy)
+        assert row.policy in {"", planners.UNIFORM, *SIGHTS}
+    assert len({row.label for row in CASE_PLANNERS.values()}) == len(CASE_PLANNERS)
 
 
 def test_no_two_rows_look_the_same() -> None:
