@@ -11,13 +11,16 @@ from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from typing import NoReturn
 
+import psutil
+
 from guided_lgp.errors import InputError
 
 ACCEPTED, REFUSED, FOREIGN, SLOW = "accepted", "refused", "foreign", "slow"
 LIMIT_S = 5.0
 """CPU time of one input."""
-HANG_S = 60.0
-"""Wall clock after which a process that answers no signal is killed."""
+HANG_S = 600.0
+"""Wall clock after which a process that does nothing is killed: others may have the machine."""
+_LOOK_S = 1.0
 LONGEST = 1200
 """Characters of a refusal; the command line shortens it once more."""
 
@@ -97,7 +100,7 @@ def _judge_until_death(attempt: Try, numbers: list[int], found: Verdicts) -> lis
     done = 0
     while done < len(numbers):
         try:
-            hangs = not receiver.poll(HANG_S)
+            hangs = not _answers(receiver, child.pid)
             outcome, fault = (SLOW, f"{numbers[done]}: hangs") if hangs else receiver.recv()
         except EOFError:
             child.join()
@@ -110,6 +113,17 @@ def _judge_until_death(attempt: Try, numbers: list[int], found: Verdicts) -> lis
             break
     child.join()
     return numbers[done:]
+
+
+def _answers(receiver: Connection, pid: int) -> bool:
+    """Whether a child says something before it has taken too long; some answer no signal."""
+    process, end = psutil.Process(pid), time.monotonic() + HANG_S
+    before = sum(process.cpu_times()[:2])
+    while not receiver.poll(min(_LOOK_S, HANG_S)):
+        worked = sum(process.cpu_times()[:2]) - before
+        if worked > 4 * LIMIT_S or time.monotonic() > end:
+            return False
+    return True
 
 
 def _judge_here(attempt: Try, numbers: list[int], sender: Connection) -> None:
