@@ -36,7 +36,7 @@ from hostility.loaders import ROOT, Examples, loaders
 from hostility.writers import PARAMS, writers
 
 SEED = 20
-INPUTS, COMMANDS = 27_500, 3_000
+INPUTS, COMMANDS = 28_700, 1_500
 RESULT = ROOT / "reports" / "metrics" / "hostile.json"
 STAGES = {
     generate_scenes: (0, 5, 10, 15, 20, 25, 30, 35),

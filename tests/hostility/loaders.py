@@ -218,22 +218,26 @@ def _documents(examples: Examples) -> Iterator[Loader]:
         yield Loader(f"scene {name}", examples.scenes, (name,), read, 2 / len(scenes))
     yield Loader("plan", examples.scenes, ("plan.json",), lambda f: read_plan(f / "plan.json"), 0.3)
     yield Loader(
-        "mesh", examples.scenes, ("wedge.obj",), partial(_validated_scene, name="whole.json")
+        "mesh", examples.scenes, ("wedge.obj",), partial(_validated_scene, name="whole.json"), 0.4
     )
     goals = tuple(f"goal{number}.txt" for number in range(len(GOALS)))
     yield Loader("goal", examples.scenes, goals, partial(_objective, names=goals))
-    yield Loader("JSON", examples.scenes, scenes, lambda f: [read_json(f / n) for n in scenes])
+    yield Loader("JSON", examples.scenes, scenes[:1], lambda f: read_json(f / scenes[0]))
     folder = examples.parameters
-    yield Loader("YAML", folder, ("params.yaml",), lambda f: read_yaml(f / "params.yaml"))
+    yield Loader("YAML", folder, ("planning.yaml",), lambda f: read_yaml(f / "planning.yaml"))
     yield Loader(
-        "parameters", folder, ("params.yaml",), lambda f: read_params(f / "params.yaml", Params)
+        "parameters",
+        folder,
+        ("params.yaml",),
+        lambda f: read_params(f / "params.yaml", Params),
+        0.4,
     )
     yield Loader("limits", folder, ("planning.yaml",), lambda f: load_planning(f / "planning.yaml"))
-    yield Loader("studies", folder, ("params.yaml", "studies/params.yaml"), load_study)
+    yield Loader("studies", folder, ("params.yaml", "studies/params.yaml"), load_study, 0.5)
     robot = ("own.yaml", "own_description/own.urdf", "own_description/own.srdf")
     yield Loader("robot file", examples.robot, robot[:1], lambda f: read_robot(f / "own.yaml"), 0.5)
     yield Loader(
-        "description", examples.robot, robot[1:], lambda f: read_robot(f / "own.yaml"), 0.5
+        "description", examples.robot, robot[1:], lambda f: read_robot(f / "own.yaml"), 0.15
     )
 
 
@@ -284,7 +288,7 @@ def _stage_files(examples: Examples) -> Iterator[Loader]:
     )
     yield Loader("report", folder, files, _report, 0.2)
     lock = ("dvc.lock",)
-    yield Loader("dvc.lock", examples.parameters, lock, lambda f: read_lock(f / "dvc.lock"), 0.2)
+    yield Loader("dvc.lock", examples.parameters, lock, lambda f: read_lock(f / "dvc.lock"), 0.1)
 
 
 def _sequences(folder: Path) -> object:
