@@ -28,12 +28,8 @@ LENGTHS = tuple(range(2, 11))
 SEED = 20_004
 SCENES = 20
 """Configurations per setup, as in ``version.py``."""
-PATHS = 10
-"""Random sequences, each in a scene of its own; all their prefixes are planned."""
-WALKS = {"a": 60, "e10": 10}
-"""Random walks by setup: the one of the enumeration, and the largest of the searches."""
-ENUMERATED = 2
-"""Configurations."""
+COUNT = 100
+"""How many random sequences of setup a the coarse bound judges; a tenth of them get paths."""
 LONG, STEPS, ATTEMPTS = 40, 100, 200
 """Actions of the long program, steps of the solver on it, and actions tried on the way."""
 RUNS = 4
@@ -119,16 +115,20 @@ def both() -> Iterator[Pair]:
             pair.new.close()
 
 
-def measure() -> dict[str, Any]:
+def measure(count: int = COUNT) -> dict[str, Any]:
     """Every ratio, and the times and numbers behind it."""
     with both() as pair:
-        figures = {name: part(pair) for name, part in PARTS.items()}
+        figures = {name: part(pair, count) for name, part in PARTS.items()}
     return {"baseline": BASELINE} | figures | {"plan_process": processes()}
 
 
-def coarse_bound(pair: Pair) -> dict[str, Any]:
-    """Verdicts of the coarse bound along random walks that end at the first infeasible one."""
-    verdicts = [v for setup, count in WALKS.items() for v in _walks(pair, setup, count)]
+def coarse_bound(pair: Pair, count: int) -> dict[str, Any]:
+    """Verdicts of the coarse bound along random walks that end at the first infeasible one.
+
+    In the setup of the enumeration, and a tenth as many in that of the largest searches.
+    """
+    walks = {"a": count, "e10": max(1, count // 10)}
+    verdicts = [v for setup, number in walks.items() for v in _walks(pair, setup, number)]
     same = {feasible: [v for v in verdicts if _both(v, feasible)] for feasible in (True, False)}
     unexplained = [v for v in same[False] if v["new"]["starts"]]
     return {
@@ -163,11 +163,14 @@ def _both(verdict: dict[str, Any], feasible: bool) -> bool:
     return all(verdict[name]["feasible"] is feasible for name in VERSIONS)
 
 
-def path_bound(pair: Pair) -> dict[str, Any]:
-    """Path bound and its verification on random coarse-feasible sequences of setup a."""
+def path_bound(pair: Pair, count: int) -> dict[str, Any]:
+    """Path bound and its verification on random coarse-feasible sequences of setup a.
+
+    Each is in a scene of its own; all prefixes are planned.
+    """
     rng = np.random.default_rng([SEED, 1])
     verdicts: dict[int, list[dict[str, Any]]] = {length: [] for length in LENGTHS}
-    for number in range(PATHS):
+    for number in range(max(1, count // 10)):
         words = _feasible(pair, "a", number, max(LENGTHS), rng)
         for length in LENGTHS:
             verdicts[length].append(pair.ask("path", "a", number, words[:length]))
@@ -200,9 +203,9 @@ def _feasible(
     return _feasible(pair, setup, number, length, rng)
 
 
-def enumeration(pair: Pair) -> dict[str, Any]:
+def enumeration(pair: Pair, count: int) -> dict[str, Any]:
     """Verdicts per second of the stage that enumerates setup a."""
-    answers = [pair.ask("enumeration", "a", number) for number in range(ENUMERATED)]
+    answers = [pair.ask("enumeration", "a", number) for number in range(max(1, count // 50))]
     figures = summary(answers)
     totals = {v: sum(a[v]["seconds"] for a in answers) for v in VERSIONS}
     rates = {v: sum(a[v]["verdicts"] for a in answers) / totals[v] for v in VERSIONS}
@@ -213,7 +216,7 @@ def enumeration(pair: Pair) -> dict[str, Any]:
     }
 
 
-def coarse_step(pair: Pair) -> dict[str, Any]:
+def coarse_step(pair: Pair, count: int) -> dict[str, Any]:
     """One step of the solver on a program of 40 actions with ten boxes."""
     rng = np.random.default_rng([SEED, 2])
     words = _feasible(pair, "e10", 0, LONG, rng)
@@ -263,7 +266,7 @@ def summary(answers: list[dict[str, Any]]) -> dict[str, Any]:
     }
 
 
-PARTS: dict[str, Callable[[Pair], Any]] = {
+PARTS: dict[str, Callable[[Pair, int], Any]] = {
     "coarse_bound": coarse_bound,
     "path_bound": path_bound,
     "enumeration": enumeration,
@@ -295,7 +298,7 @@ def main(names: list[str]) -> None:
         print(json.dumps(processes(), indent=1))
         return
     with both() as pair:
-        print(json.dumps({name: PARTS[name](pair) for name in names or PARTS}, indent=1))
+        print(json.dumps({name: PARTS[name](pair, COUNT) for name in names or PARTS}, indent=1))
 
 
 if __name__ == "__main__":

@@ -73,7 +73,7 @@ def enumeration() -> dict[str, float]:
         with tempfile.TemporaryDirectory() as folder:
             tasks = [
                 enumerate_sequences.Task(
-                    scene, params.bounds, params.enumerate_sequences, Path(folder)
+                    scene, params.bounds, params.enumerate_sequences, "", Path(folder)
                 )
                 for scene in scenes
             ]

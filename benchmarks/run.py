@@ -53,7 +53,7 @@ MEASURES: dict[str, Callable[[int], Any]] = {
     "planners": lambda count: pipeline.planners(),
     "training": lambda count: pipeline.training(),
     "memory": lambda count: pipeline.memory(),
-    "against": lambda count: against.measure(),
+    "against": against.measure,
     "false_infeasible": lambda count: witness.measure(),
     "minutes": lambda count: pipeline.minutes(),
 }

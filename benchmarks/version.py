@@ -118,9 +118,10 @@ def path_verdict(setup: str, number: int, words: list[str]) -> dict[str, Any]:
 def enumeration(setup: str, number: int) -> dict[str, Any]:
     """All verdicts of one configuration, as the stage of the pipeline asks for them."""
     with tempfile.TemporaryDirectory() as folder:
-        task = enumerate_sequences.Task(
-            scenes(setup)[number], PARAMETERS.bounds, PARAMETERS.enumerate_sequences, Path(folder)
-        )
+        given = {"limits": PARAMETERS.enumerate_sequences, "bounds": PARAMETERS.bounds}
+        if "sources" in enumerate_sequences.Task.__annotations__:
+            given["sources"] = ""
+        task = enumerate_sequences.Task(scenes(setup)[number], **given, folder=Path(folder))
         began = time.process_time()
         enumerate_sequences.write_shard(task)
         seconds = time.process_time() - began
