@@ -87,6 +87,7 @@ def test_faults(content: bytes, fault: str, tmp_path: Path) -> None:
         ("a: [", "expected the node content"),
         ("a: 2024-13-45", "month must be in 1..12"),
         ("[" * 5000, "is nested too deeply"),
+        ("a: &x [1, {b: *x}]", "has an alias inside of what it stands for"),
     ],
 )
 def test_faults_in_yaml(content: str, fault: str, tmp_path: Path) -> None:
@@ -105,6 +106,13 @@ def test_yaml(tmp_path: Path) -> None:
     assert document["b"] == {"x": 3, "y": 2}
     file.write_text("x" * 10)
     assert read_yaml(file) == "x" * 10
+
+
+def test_a_value_with_many_names_is_read_at_once(tmp_path: Path) -> None:
+    file = tmp_path / "file.yaml"
+    levels = [f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 9)}]" for n in range(1, 20)]
+    file.write_text("\n".join(["a0: &a0 x", *levels]))
+    assert len(read_yaml(file)["a19"]) == 9
 
 
 def test_a_long_line_keeps_its_ends() -> None:

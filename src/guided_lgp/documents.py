@@ -133,7 +133,9 @@ def read_yaml(path: Path, accepted: str = "") -> Any:
     """
     where = str(path)
     try:
-        return _Loader(path.read_text(encoding="utf-8")).get_single_data()
+        document = _Loader(path.read_text(encoding="utf-8")).get_single_data()
+        _require_an_end(document, frozenset(), set())
+        return document
     except OSError as error:
         raise InputError(where, error.strerror or "cannot be read", accepted) from None
     except RecursionError:
@@ -141,6 +143,25 @@ def read_yaml(path: Path, accepted: str = "") -> Any:
     except (yaml.YAMLError, ValueError, LookupError, AttributeError) as error:
         # PyYAML raises the last three for values that do not fit their tag, such as 2024-13-45.
         raise InputError(where, f"is not YAML: {' '.join(str(error).split())}", accepted) from None
+
+
+def _require_an_end(value: Any, above: frozenset[int], known: set[int]) -> None:
+    """Refuse a document of which a part holds itself, by an anchor and its alias.
+
+    Args:
+        value: a part of the document.
+        above: the parts that hold it.
+        known: the parts that have an end; aliases can name one a million times.
+
+    Raises:
+        ValueError: it has none.
+    """
+    if isinstance(value, dict | list) and id(value) not in known:
+        if id(value) in above:
+            raise ValueError("has an alias inside of what it stands for")
+        for inner in value.values() if isinstance(value, dict) else value:
+            _require_an_end(inner, above | {id(value)}, known)
+        known.add(id(value))
 
 
 class _Loader(yaml.SafeLoader):
