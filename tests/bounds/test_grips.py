@@ -57,7 +57,7 @@ def test_verification_accepts_every_grip(size: tuple[float, float, float]) -> No
 
 
 def test_some_grips_are_from_above_some_from_the_sides_some_by_the_fingertips_only() -> None:
-    _, (_, others) = grips_of(box(0.15, 0.07, 0.10), ARM).popitem()
+    _, others = grips_of(box(0.15, 0.07, 0.10), ARM)[0.07]
     down = others.rotation[:, 2, 0]
     assert down.min() == pytest.approx(-1.0)
     assert down.max() == pytest.approx(0.0, abs=1e-9)

@@ -28,6 +28,11 @@ def leaves(values: Mapping[str, Any], prefix: tuple[str, ...] = ()) -> Iterator[
             yield (*prefix, key, value)
 
 
+def table(values: Mapping[str, Any]) -> dict[tuple[str, ...], Any]:
+    """Every value by its keys, but for the layouts of cases."""
+    return {tuple(keys): value for *keys, value in leaves(values) if "layout" not in keys}
+
+
 FIELDS = [keys for *keys, _ in leaves(DOCUMENT)]
 
 
@@ -42,11 +47,13 @@ def read(path: Path, text: str | bytes) -> Params | None:
 def check(params: Params, document: Any) -> None:
     """Nothing is left out, made up or converted, except numbers written as text: ``1e-3``.
 
-    What a recipe does not name is the paper's.
+    What a recipe does not name is the paper's, a case has no controls that it does not name; the
+    layout of a case is its family's to check.
     """
-    accepted = {tuple(keys): value for *keys, value in leaves(params.model_dump())}
+    accepted = table(params.model_dump(mode="json"))
     given = {("build_dataset", "improved", *keys): value for *keys, value in leaves(PAPER)}
-    given |= {tuple(keys): value for *keys, value in leaves(document)}
+    given |= {("cases", name, "controls"): [] for name in params.cases}
+    given |= table(document)
     assert set(accepted) == set(given)
     for keys, value in accepted.items():
         assert isinstance(given[keys], bool) == isinstance(value, bool)
