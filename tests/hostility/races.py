@@ -12,8 +12,9 @@ from dataclasses import dataclass, field
 from multiprocessing.synchronize import Event
 from pathlib import Path
 
-from guided_lgp import cli, tracking
+from guided_lgp import tracking
 from guided_lgp.documents import write_text
+from guided_lgp.tracking.database import search
 from hostility.kills import contents
 from hostility.loaders import ROOT
 from load import PIPELINE
@@ -166,7 +167,7 @@ def record_at_once(folder: Path, figures: Figures, processes: int = 4) -> None:
     said = together([command] * processes, folder, MLFLOW_TRACKING_URI=database)
     figures.runs += processes
     os.environ["MLFLOW_TRACKING_URI"] = database
-    found = list(tracking.search(tracking.prepare(), f"tags.`{tracking.STAGE_TAG}` != ''"))
+    found = list(search(tracking.prepare(), f"tags.`{tracking.STAGE_TAG}` != ''"))
     finished = sum(run.info.status == "FINISHED" for run in found)
     for _ in range(processes - finished):
         figures.lose(f"{finished} of {processes} stages recorded: {[line for _, line in said]}")
@@ -174,7 +175,6 @@ def record_at_once(folder: Path, figures: Figures, processes: int = 4) -> None:
 
 def all_races(folder: Path, figures: Figures) -> None:
     """Everything, in folders of its own."""
-    assert cli.STAGES
     for name, work in {
         "writers": lambda at: write_at_once(at, figures, 1000),
         "plans": lambda at: plan_at_once(at, figures),
