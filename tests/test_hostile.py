@@ -5,15 +5,17 @@ import os
 import signal
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
 
-from guided_lgp.documents import write_text
+from guided_lgp.documents import read_json, write_text
 from guided_lgp.errors import InputError
-from hostile import SEED, inputs, startup_ms
+from hostile import RESULT, SEED, inputs, startup_ms
 from hostility import environments, judge, kills, limits, planted, races
 from hostility.kills import Writer
+from hostility.loaders import loaders
 
 
 def test_five_hundred_inputs_end_well(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -170,6 +172,32 @@ def test_an_environment_that_matters_shows(tmp_path: Path, monkeypatch: pytest.M
         )
         environments.compare(first, second, "no HOME", figures)
     assert (figures.tried, figures.different) == (2, 1)
+
+
+def test_the_published_figures_hold(tmp_path: Path) -> None:
+    """Nothing came through, as often as was aimed at; and a few rows come out again."""
+    figures = read_json(RESULT)
+    assert figures["seed"] == SEED
+    tried = figures["inputs"]
+    assert tried["tried"] >= 30_000
+    assert tried["tried"] == sum(row["tried"] for row in tried["by_reader"].values())
+    assert tried["tried"] == tried["accepted"] + tried["refused"]
+    assert (tried["foreign"], tried["slow"]) == (0, 0)
+    assert figures["kills"]["inside_window"] >= 200
+    assert figures["kills"]["in_stages"] >= 20
+    assert figures["kills"]["damaged"] == 0
+    assert (figures["races"]["torn"], figures["races"]["lost"]) == (0, 0)
+    assert figures["planted"]["tried"] == len((*planted.OF_OTHERS, *planted.PLANTS, *planted.ACTS))
+    assert figures["planted"]["effective"] == 0
+    assert figures["limits"]["tried"] >= 50
+    assert (figures["limits"]["torn"], figures["limits"]["foreign"]) == (0, 0)
+    assert figures["environments"] == {"tried": len(environments.ENVIRONMENTS), "different": 0}
+    assert figures["startup_ms"] <= 10
+    rows = {reader.name: reader for reader in loaders(tmp_path)}
+    for name in ("data set", "JSON", "YAML"):
+        row = tried["by_reader"][name]
+        attempt = partial(rows[name].attempt, SEED)
+        assert judge.judge(attempt, range(row["tried"])).figures() == row
 
 
 def test_the_checks_at_the_start_cost_little() -> None:
