@@ -157,9 +157,10 @@ def test_a_damaged_shard_is_computed_again(
 
 
 def test_shards_of_other_sources_are_not_used(
-    tmp_path: Path, params: Params, scripted: type[OneHand]
+    tmp_path: Path, params: Params, scripted: type[OneHand], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     root = make_root(tmp_path)
+    monkeypatch.setattr(enumerate_sequences, "SOURCES", root)
     enumerate_sequences.run(params, root)
     (root / "src" / "other.py").write_text("of another case")
     enumerate_sequences.run(params, root)

@@ -200,5 +200,5 @@ def test_what_cannot_be_written_is_one_line(plan_file: Path, tmp_path: Path) -> 
         export_plan(plan, tmp_path / "motion.xml")
     with pytest.raises(InputError, match="exists"):
         export_plan(plan, tmp_path)
-    with pytest.raises(InputError, match="Not a directory"):
+    with pytest.raises(InputError, match="cannot be written: File exists"):
         export_plan(plan, plan_file / "bag")

@@ -30,7 +30,7 @@ from guided_lgp.logic import (
     two_goal_objectives,
 )
 from guided_lgp.params import BoundsParams, EnumerateSequences, Params
-from guided_lgp.paths import PIPELINE, SCENES, SEQUENCES
+from guided_lgp.paths import PIPELINE, SCENES, SEQUENCES, SOURCES
 from guided_lgp.scene import Scene, load_scenes
 from guided_lgp.search.enumerate import Enumeration, enumerate_sequences
 from guided_lgp.search.observation import observe_all, start
@@ -72,7 +72,7 @@ def run(params: Params, root: Path) -> None:
     """Write ``data/sequences/{training,test}.parquet`` and ``{training,test}_shortest.parquet``."""
     folder = root / SEQUENCES.parent / ".shards"
     splits = {name: load_scenes(root / SCENES / f"{name}.json").scenes for name in SPLITS}
-    given = params.bounds, params.enumerate_sequences, source_digest(root), folder
+    given = params.bounds, params.enumerate_sequences, source_digest(), folder
     tasks = {name: [Task(scene, *given) for scene in scenes] for name, scenes in splits.items()}
     whole = [task for split in tasks.values() for task in split]
     _remove_others(folder, {task.shard for task in whole})
@@ -175,16 +175,16 @@ def _states(scene: Scene, verdict: CoarseResult) -> list[float]:
     return flat
 
 
-def source_digest(root: Path) -> str:
-    """Digest of the sources that dvc.yaml lists for this stage.
+def source_digest() -> str:
+    """Digest of the sources that dvc.yaml lists for this stage: those of the clone that runs it.
 
     Raises:
         InputError: dvc.yaml is missing or damaged.
     """
     digest = sha256()
-    for source in read_yaml(root / PIPELINE)["stages"][STAGE]["deps"]:
+    for source in read_yaml(SOURCES / PIPELINE)["stages"][STAGE]["deps"]:
         if Path(source).is_relative_to("src"):
-            for file in _files(root / source):
+            for file in _files(SOURCES / source):
                 digest.update(file.read_bytes())
     return digest.hexdigest()
 
