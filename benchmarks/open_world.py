@@ -10,7 +10,6 @@ changes nothing; times stand apart. Writes ``reports/metrics/open_world.json`` a
 """
 
 import json
-import logging
 import sys
 import time
 from collections.abc import Iterable, Mapping, Sequence
@@ -56,7 +55,6 @@ class Task:
 
 def run_task(task: Task) -> tuple[dict[str, Any], float]:
     """The row of a scene, and the time (s) of the default planner."""
-    logging.getLogger("guided_lgp").setLevel(logging.ERROR)
     case, begin = cases(task.kind, task.number), time.perf_counter()
     result = _planned(case, CALLS)
     elapsed = time.perf_counter() - begin

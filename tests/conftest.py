@@ -1,6 +1,5 @@
-"""What tests in several folders use: loggers, a Dask cluster whose workers can be killed."""
+"""What tests in several folders use: a Dask cluster whose workers can be killed."""
 
-import logging
 import os
 import subprocess
 import sys
@@ -9,14 +8,6 @@ from pathlib import Path
 
 import pytest
 from dask.distributed import LocalCluster
-
-
-@pytest.fixture(autouse=True)
-def loggers_awake() -> None:
-    """MLflow's migrations disable every logger that there is: a test begins with ours enabled."""
-    for name in tuple(logging.root.manager.loggerDict):
-        if name.split(".")[0] == "guided_lgp":
-            logging.getLogger(name).disabled = False
 
 
 @pytest.fixture
