@@ -192,8 +192,8 @@ class Scene(Document):
     """Bodies that are neither moved nor stood on."""
 
     def __hash__(self) -> int:
-        """Cheap, since measures of scenes are cached; scenes of one name are told apart by ==."""
-        return hash(self.name)
+        """Cheap, since measures of scenes are cached; parts of a scene share its name."""
+        return hash((self.name, *(box.name for box in self.boxes)))
 
     @property
     def movable(self) -> tuple[Box, ...]:

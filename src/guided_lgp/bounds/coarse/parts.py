@@ -14,7 +14,7 @@ from guided_lgp.bounds.results import Array, CoarseResult
 from guided_lgp.logic import Skeleton, successor
 from guided_lgp.poses import pose
 from guided_lgp.scene import Scene
-from guided_lgp.scene.world import World
+from guided_lgp.scene.world import World, world_of
 
 Boxes = frozenset[str]
 
@@ -48,7 +48,6 @@ class Parts:
     ) -> None:
         self._scene, self._restarts, self._facts = scene, restarts, facts
         self._deadline = deadline
-        self._world: World | None = None
         self._bounds: dict[Boxes, CoarseBound] = {}
         self._known: dict[tuple[Boxes, Skeleton], CoarseResult] = {}
 
@@ -68,7 +67,6 @@ class Parts:
 
     def _bound(self, boxes: Boxes) -> CoarseBound:
         if boxes not in self._bounds:
-            self._world = self._world or World(self._scene)
             kept = tuple(b for b in self._scene.boxes if b.fixed or b.name in boxes)
             part = self._scene.model_copy(update={"boxes": kept})
             self._bounds[boxes] = CoarseBound(
@@ -76,13 +74,13 @@ class Parts:
                 self._restarts,
                 deadline=self._deadline,
                 facts=self._facts,
-                world=_PartOfWorld(self._world, part),
+                world=_PartOfWorld(world_of(self._scene), part),
             )
         return self._bounds[boxes]
 
 
 class _PartOfWorld(World):
-    """A world with some of its boxes put out of the way: loading another takes 0.3 s."""
+    """A scene's world with some of its boxes put out of the way: loading another takes 0.3 s."""
 
     def __init__(self, whole: World, part: Scene) -> None:
         self.__dict__.update(copy(whole).__dict__)
