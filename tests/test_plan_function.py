@@ -148,6 +148,7 @@ def test_attempts_that_go_in_circles_are_told_apart_from_infeasible_ones() -> No
         infeasible_calls=5,
         part_calls=0,
         path_calls=1,
+        failed_candidates=0,
         causes=("max_depth", "infeasible", "max_depth"),
         reattempts={},
         times=Times(0.0, 0.0, 0.0, 0.0),

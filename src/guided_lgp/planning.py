@@ -320,6 +320,7 @@ def _without_search(
         infeasible_calls=0,
         part_calls=0,
         path_calls=0,
+        failed_candidates=0,
         causes=(),
         reattempts={},
         times=Times(0.0, 0.0, 0.0, 0.0),

@@ -327,7 +327,7 @@ def _report(folder: Path) -> object:
     return (
         summary(inputs),
         tables.training_metrics(inputs.training),
-        tables.generalization(inputs.generalization, analysis.calls_per_action(inputs.problems)),
+        tables.generalization(inputs.generalization, analysis.calls(inputs.problems)),
         tables.unseen(analysis.by_novelty(inputs.problems, novelty), novelty),
         scalability(inputs.scalability, inputs.timing),
         tables.training(inputs.training),

@@ -98,9 +98,11 @@ def spread() -> dict[str, Any]:
 def cases() -> dict[str, Any]:
     """Figures as ``make cases`` writes them."""
     cell = {"scenes": 20, "trainings": 1, "problems": 20, "solved": 10, "solved_min": 10}
-    means = {"calls_mean": 18.5, "infeasible_calls_mean": 7.0, "plan_length_mean": 5.0}
+    means = {"calls_mean": 18.5, "infeasible_calls_mean": 7.0, "failed_candidates_mean": 0.5}
     learnt = {"trainings": 3, "problems": 60, "solved": 60, "solved_min": 20, "calls_mean": 6.5}
-    without = cell | means | {"path_verified_share": None, "physics_share": None}
+    without = (
+        cell | means | {"plan_length_mean": 5.0, "path_verified_share": None, "physics_share": None}
+    )
     ours = without | learnt | {"path_verified_share": 1.0, "physics_share": 0.95}
     return {"rows": {size: {"facts": without, "relational": ours} for size in ("4", "5")}}
 
@@ -155,6 +157,9 @@ def _write_generalization(root: Path, scenes: Any, rng: np.random.Generator) -> 
             "outcome": str(rng.choice(["shortest", "feasible", "no_solution"], p=p)),
             "length": 4,
             "policy_calls": 6,
+            "coarse_calls": 5,
+            "infeasible_calls": 1,
+            "failed_candidates": 0,
         }
         for scene in scenes
         for objective in objectives
@@ -213,6 +218,8 @@ def _write_scalability(root: Path, scenes: Any) -> None:
                 "tree_size_std": 0.1 * (size or 12345.0),
                 "plan_length_mean": float(problem.k_min),
                 **{f"{part}_calls_mean": 1.1 * problem.k_min for part in ("policy", "coarse")},
+                "infeasible_calls_mean": 2.5,
+                "failed_candidates_mean": 0.5,
                 "path_calls_mean": 1.0,
             }
             total = 0.5 + 1e-3 * (size or 12345.0)

@@ -110,8 +110,19 @@ def test_shares_by_novelty_leave_out_what_holds_at_the_start() -> None:
     ]
 
 
-def test_policy_calls_count_solved_problems_only() -> None:
-    problems = pd.DataFrame(
-        {"planner": "default", "length": [4, None, 2], "policy_calls": [6, 90, 2]}
-    )
-    assert analysis.calls_per_action(problems) == {"default": 1.25}
+def test_calls_count_solved_problems_only() -> None:
+    counts = {
+        "policy_calls": [6, 90, 2],
+        "coarse_calls": [5, 90, 2],
+        "infeasible_calls": [1, 80, 0],
+        "failed_candidates": [1, 9, 0],
+    }
+    problems = pd.DataFrame({"planner": "default", "length": [4, None, 2], **counts})
+    assert analysis.calls(problems) == {
+        "default": {
+            "policy_calls": 1.25,
+            "coarse_calls": 3.5,
+            "infeasible_calls": 0.5,
+            "failed_candidates": 0.5,
+        }
+    }

@@ -50,7 +50,19 @@ def test_table_1_stands_beside_the_papers(rendered: Path) -> None:
     assert shown["Paper's networks", "default", "ours"] == ["90.0%", "90.0%", "170", "90"]
     assert shown["Improved networks", "best-first", "ours"][:2] == ["99.0%", "99.0%"]
     assert shown["Relational policy", "best-first", "ours"][:2] == ["100.0%", "100.0%"]
-    assert {row[-3] for row in rows} == {"–", "1.50"}
+    assert {tuple(row[-6:-2]) for row in rows} == {
+        ("–", "–", "–", "–"),
+        ("1.50", "5.00", "1.00", "0.00"),
+    }
+
+
+def test_calls_to_a_plan_stand_in_the_details(rendered: Path) -> None:
+    frame = pd.read_csv(rendered / "reports/tables/table_3_details.csv")
+    guided = frame[frame["planner"] == "guided"]
+    assert set(guided["infeasible_calls_mean"]) == {2.5}
+    assert set(guided["failed_candidates_mean"]) == {0.5}
+    heading = (rendered / "reports/tables/table_3_details.md").read_text(encoding="utf-8")
+    assert "| Coarse calls | Infeasible | Failed candidates | Path calls |" in heading
 
 
 def test_unseen_objectives_are_told_apart(rendered: Path) -> None:

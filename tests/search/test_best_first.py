@@ -118,6 +118,7 @@ def test_ends_after_so_many_sequences_without_a_path(scene: Scene, limits: Searc
         Problem(scene, parse_objective(["(held red)"]), limits, bounds, UNIFORM)
     )
     assert (result.reason, result.path_calls) == ("max_paths", 5)
+    assert result.failed_candidates == 5
     assert "limit of sequences without a path" in result.explanation
 
 

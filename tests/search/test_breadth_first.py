@@ -57,6 +57,7 @@ def test_stops_at_the_limit_and_says_why(scene: Scene) -> None:
     assert 2_000 <= result.tree_size < 2_020
     assert "stopped at the limit" in result.explanation
     assert "reach violated" in result.explanation
+    assert result.failed_candidates > result.infeasible_calls == 4  # of one action
 
 
 def test_times_of_known_verdicts_count(scene: Scene) -> None:

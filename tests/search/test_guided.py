@@ -53,6 +53,7 @@ def test_reattempt_after_an_infeasible_step(scene: Scene, limits: SearchLimits) 
     assert result.skeleton == parse_skeleton("(grasp pr2R red) (place pr2R red tab2)")
     assert result.causes == ("infeasible",)
     assert result.reattempts == {"infeasible": 1, "max_depth": 0}
+    assert (result.infeasible_calls, result.failed_candidates) == (1, 0)
     assert result.tree_size == 1 + 6 + 6
 
 
@@ -65,6 +66,7 @@ def test_reattempt_after_an_infeasible_path(scene: Scene, limits: SearchLimits) 
     assert result.skeleton == parse_skeleton("(grasp pr2R red)")
     assert result.causes == ("infeasible",)
     assert len(bounds.path_asked) == 2
+    assert (result.infeasible_calls, result.failed_candidates) == (0, 1)
 
 
 def test_maximum_depth_ends_attempts(scene: Scene) -> None:

@@ -27,7 +27,7 @@ from guided_lgp.search.policy import Policy
 from guided_lgp.search.problem import Problem
 
 Row = dict[str, Any]
-COUNTS = ("coarse_calls", "infeasible_calls", "part_calls")
+COUNTS = ("coarse_calls", "infeasible_calls", "part_calls", "failed_candidates")
 
 logger = logging.getLogger(__name__)
 
@@ -129,7 +129,6 @@ def _row(task: Task, planner: Planner, policy: Policy | None, bounds: CoarseBoun
         "skeleton": None if result.skeleton is None else format_skeleton(result.skeleton),
         "length": None if result.skeleton is None else len(result.skeleton),
         **{name: getattr(result, name) for name in COUNTS},
-        "failed_candidates": len(result.causes),
         "path_verified": None,
         "physics": None,
         "time_s": round(result.times.total, 4),

@@ -20,7 +20,7 @@ from guided_lgp import parallel
 from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.documents import write_json
 from guided_lgp.experiments.memory import peak_mb, reset_peak
-from guided_lgp.experiments.outcomes import SCALABILITY
+from guided_lgp.experiments.outcomes import BOUND_COUNTS, SCALABILITY
 from guided_lgp.experiments.policies import load_policies
 from guided_lgp.experiments.problems import PROBLEMS
 from guided_lgp.logic import format_objective, format_skeleton
@@ -34,7 +34,7 @@ from guided_lgp.tables import write_table
 
 Row = dict[str, Any]
 
-COUNTS = ("expansions", "policy_calls", "coarse_calls", "path_calls")
+COUNTS = ("expansions", "policy_calls", *BOUND_COUNTS, "path_calls")
 TIMES = ("symbolic", "policy", "coarse", "path")
 
 logger = logging.getLogger(__name__)
@@ -113,10 +113,7 @@ def _figures(result: SearchResult) -> Row:
         "skeleton": format_skeleton(skeleton) if skeleton is not None else None,
         "length": len(skeleton) if skeleton is not None else None,
         "tree_size": result.tree_size,
-        "expansions": result.expansions,
-        "policy_calls": result.policy_calls,
-        "coarse_calls": result.coarse_calls,
-        "path_calls": result.path_calls,
+        **{count: getattr(result, count) for count in COUNTS},
         "reattempts_infeasible": result.reattempts["infeasible"],
         "reattempts_max_depth": result.reattempts["max_depth"],
         "time_s": result.times.total,

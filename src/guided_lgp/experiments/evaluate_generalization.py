@@ -17,7 +17,7 @@ import pyarrow as pa
 from guided_lgp import parallel
 from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.documents import write_json
-from guided_lgp.experiments.outcomes import GENERALIZATION, OUTCOMES
+from guided_lgp.experiments.outcomes import BOUND_COUNTS, GENERALIZATION, OUTCOMES
 from guided_lgp.experiments.policies import load_policies
 from guided_lgp.logic import (
     Objective,
@@ -168,7 +168,7 @@ def _figures(result: SearchResult, shortest: int | None) -> Row:
         "tree_size": result.tree_size,
         "expansions": result.expansions,
         "policy_calls": result.policy_calls,
-        "coarse_calls": result.coarse_calls,
+        **{count: getattr(result, count) for count in BOUND_COUNTS},
         "path_calls": result.path_calls,
         "reason": result.reason,
     }

@@ -4,6 +4,9 @@ import pyarrow as pa
 
 OUTCOMES = ("shortest", "feasible", "no_solution")
 
+BOUND_COUNTS = ("coarse_calls", "infeasible_calls", "failed_candidates")
+"""What a search asks of the coarse bound, how much of that it refuses, and the plans refused."""
+
 GENERALIZATION = pa.schema(
     [
         ("configuration", pa.string()),
@@ -21,6 +24,8 @@ GENERALIZATION = pa.schema(
         ("expansions", pa.int32()),
         ("policy_calls", pa.int32()),
         ("coarse_calls", pa.int32()),
+        ("infeasible_calls", pa.int32()),
+        ("failed_candidates", pa.int32()),
         ("path_calls", pa.int32()),
         ("reason", pa.string()),
     ]
@@ -42,6 +47,8 @@ SCALABILITY = pa.schema(
         ("expansions", pa.int32()),
         ("policy_calls", pa.int32()),
         ("coarse_calls", pa.int32()),
+        ("infeasible_calls", pa.int32()),
+        ("failed_candidates", pa.int32()),
         ("path_calls", pa.int32()),
         ("reattempts_infeasible", pa.int32()),
         ("reattempts_max_depth", pa.int32()),

@@ -8,6 +8,7 @@ from typing import Any
 
 import pandas as pd
 
+from guided_lgp.experiments.outcomes import BOUND_COUNTS
 from guided_lgp.logic import (
     Goal,
     Objective,
@@ -108,17 +109,21 @@ def by_novelty(problems: pd.DataFrame, kinds: Mapping[str, str]) -> pd.DataFrame
     return pd.DataFrame({"n": groups.size(), "shortest": groups.mean()}).reset_index()
 
 
-def calls_per_action(problems: pd.DataFrame) -> dict[str, float]:
-    """Mean number of policy calls per action of the plan, by planner, over the problems solved.
+def calls(problems: pd.DataFrame) -> dict[str, dict[str, float]]:
+    """Mean calls to a plan by planner, over the problems solved.
 
     Args:
-        problems: columns planner, length and policy_calls; the last two empty without a plan.
+        problems: columns planner, length, policy_calls and :data:`BOUND_COUNTS`; all but the first
+            empty without a plan.
+
+    Returns:
+        ``policy_calls`` per action of the plan, and the others as they are.
     """
     solved = problems[problems["length"].notna() & (problems["length"] > 0)]
-    ratios = solved["policy_calls"] / solved["length"]
-    return {
-        str(name): float(mean) for name, mean in ratios.groupby(solved["planner"]).mean().items()
-    }
+    figures = solved[list(BOUND_COUNTS)].astype(float)
+    figures["policy_calls"] = solved["policy_calls"] / solved["length"]
+    means: Any = figures.groupby(solved["planner"]).mean()
+    return {str(name): row.to_dict() for name, row in means.iterrows()}
 
 
 def by_length(verdicts: pd.DataFrame) -> list[dict[str, Any]]:

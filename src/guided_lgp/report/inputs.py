@@ -9,7 +9,7 @@ import pandas as pd
 import pyarrow as pa
 from pydantic import TypeAdapter
 
-from guided_lgp.experiments.outcomes import GENERALIZATION, OUTCOMES, SCALABILITY
+from guided_lgp.experiments.outcomes import BOUND_COUNTS, GENERALIZATION, OUTCOMES, SCALABILITY
 from guided_lgp.experiments.problems import PROBLEMS, ProblemClass
 from guided_lgp.logic import format_objective, one_goal_objectives, two_goal_objectives
 from guided_lgp.paths import EVALUATION, METRICS, REPORTS, SCENES, SEQUENCES, TRAINING
@@ -33,7 +33,7 @@ _OUTCOMES = columns_of(
     GENERALIZATION,
     (
         *("configuration", "objective", "unseen", "planner"),
-        *("outcome", "length", "policy_calls"),
+        *("outcome", "length", "policy_calls", *BOUND_COUNTS),
     ),
     ("configuration", "objective", "unseen", "planner", "outcome"),
 )
@@ -52,6 +52,8 @@ _MEANS = (
     "expansions_mean",
     "policy_calls_mean",
     "coarse_calls_mean",
+    "infeasible_calls_mean",
+    "failed_candidates_mean",
     "path_calls_mean",
     "time_mean_s",
     "time_std_s",

@@ -50,6 +50,8 @@ class Sizes(_Figures):
     plan_length_mean: Annotated[Number, Field(gt=0)] | None
     policy_calls_mean: Number | None
     coarse_calls_mean: Number | None
+    infeasible_calls_mean: Number | None
+    failed_candidates_mean: Number | None
     path_calls_mean: Number | None
 
     @model_validator(mode="after")
@@ -136,6 +138,7 @@ class CaseFigures(_Figures):
     solved_min: Count
     calls_mean: Number | None
     infeasible_calls_mean: Number | None
+    failed_candidates_mean: Number | None
     plan_length_mean: Number | None
     path_verified_share: Share | None
     physics_share: Share | None

@@ -63,7 +63,7 @@ def run(params: Params, root: Path) -> None:
     write_json(root / METRICS / "summary.json", summary(inputs))
     _write_curves(inputs, reports / "curves")
     novelty = _novelty(inputs, params)
-    calls = analysis.calls_per_action(inputs.problems)
+    calls = analysis.calls(inputs.problems)
     written = {table.name: table for table in _tables(inputs, novelty, calls)}
     for table in written.values():
         for suffix, text in (
@@ -94,7 +94,9 @@ def _novelty(inputs: Inputs, params: Params) -> Mapping[str, str]:
     return analysis.novelty(symbols, chosen)
 
 
-def _tables(inputs: Inputs, novelty: Mapping[str, str], calls: Mapping[str, float]) -> list[Table]:
+def _tables(
+    inputs: Inputs, novelty: Mapping[str, str], calls: Mapping[str, Mapping[str, float]]
+) -> list[Table]:
     rejected = {name: (len(s.scenes), s.rejected) for name, s in inputs.scenes.items()}
     optional = [tables.geometry(inputs.geometry)] if inputs.geometry is not None else []
     optional += [tables.draws(inputs.spread)] if inputs.spread is not None else []

@@ -129,6 +129,8 @@ def _details(metrics: Metrics, timing: Metrics) -> Table:
                     number(cell["plan_length_mean"]),
                     number(cell["policy_calls_mean"]),
                     number(cell["coarse_calls_mean"]),
+                    number(cell["infeasible_calls_mean"]),
+                    number(cell["failed_candidates_mean"]),
                     number(cell["path_calls_mean"]),
                     *(number(times[part], 3) for part in parts),
                     number(search_time(times), 3),
@@ -146,6 +148,8 @@ def _details(metrics: Metrics, timing: Metrics) -> Table:
             "Plan length",
             "Policy calls",
             "Coarse calls",
+            "Infeasible",
+            "Failed candidates",
             "Path calls",
             "Symbolic (s)",
             "Policy (s)",
@@ -157,8 +161,10 @@ def _details(metrics: Metrics, timing: Metrics) -> Table:
         tuple(rows),
         (
             "Means over the problems solved. Calls count whether or not the verdict was known from "
-            "another planner. Without path: symbolic, policy and coarse. Peak: resident memory of "
-            "the process, libraries included.",
+            "another planner. Infeasible: coarse calls with a verdict against the sequence. Failed "
+            "candidates: sequences that reach the goals and that a bound refused. Without path: "
+            "symbolic, policy and coarse. Peak: resident memory of the process, libraries "
+            "included.",
         ),
         labels=2,
         records=records,

@@ -9,7 +9,16 @@ from typing import Literal, TypeVar
 
 from guided_lgp.bounds.deadline import OutOfTimeError
 from guided_lgp.bounds.results import Array, CoarseResult, Failure, PathResult
-from guided_lgp.logic import Action, Objective, Skeleton, State, Symbols, format_skeleton
+from guided_lgp.logic import (
+    Action,
+    Objective,
+    Skeleton,
+    State,
+    Symbols,
+    format_skeleton,
+    progress,
+    satisfied,
+)
 from guided_lgp.search.policy import Policy
 from guided_lgp.search.problem import Problem
 
@@ -72,6 +81,8 @@ class SearchResult:
     part_calls: int
     """... and those with some of the boxes alone, for what follows for the whole scene."""
     path_calls: int
+    failed_candidates: int
+    """Sequences that reach the goals and that a bound has refused."""
     causes: tuple[Cause, ...]
     """Why each failed attempt ended, in order; empty for searches without attempts."""
     reattempts: Mapping[Cause, int]
@@ -114,7 +125,7 @@ def joined(first: SearchResult, second: SearchResult) -> SearchResult:
 
 _COUNTS = (
     *("tree_size", "expansions", "policy_calls", "coarse_calls", "infeasible_calls"),
-    *("part_calls", "path_calls", "causes"),
+    *("part_calls", "path_calls", "failed_candidates", "causes"),
 )
 
 
@@ -138,6 +149,7 @@ class Run:
         self._asked: dict[Call, CoarseResult] = {}
         self._path_calls = self._policy_calls = 0
         self._failure: Failure | None = None
+        self._refused: set[Skeleton] = set()
         self.failed: Skeleton = ()
         """The sequence of the last verdict against one; no feasible sequence begins with it."""
         self._causes: list[Cause] = []
@@ -156,6 +168,7 @@ class Run:
             if not result.feasible:
                 if not self._cut_off:
                     self._failure, self.failed = result.failure, result.skeleton
+                    self._refused.add(skeleton)
                 break
         return result
 
@@ -201,6 +214,7 @@ class Run:
             self._found[skeleton] = coarse, path
         elif not self._cut_off:
             self._failure, self.failed = path.failure, skeleton
+            self._refused.add(skeleton)
         return path.feasible
 
     @property
@@ -279,6 +293,7 @@ class Run:
             infeasible_calls=sum(not verdict.feasible for verdict in self._asked.values()),
             part_calls=sum(isinstance(call[0], frozenset) for call in self._asked),
             path_calls=self._path_calls,
+            failed_candidates=sum(map(self._reaches_goals, self._refused)),
             causes=tuple(self._causes),
             reattempts={cause: followed.count(cause) for cause in causes},
             times=Times(symbolic, self._policy_s, self._coarse_s, self._path_s),
@@ -286,6 +301,10 @@ class Run:
             failure=None if reason is None else self._failure,
             failed=() if reason is None else self.failed,
         )
+
+    def _reaches_goals(self, skeleton: Skeleton) -> bool:
+        end = progress(self._problem.scene.state, skeleton)
+        return satisfied(end, self._problem.objective)
 
 
 def _cost(path: PathResult) -> tuple[int, float]:
