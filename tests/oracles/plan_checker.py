@@ -51,6 +51,7 @@ AT_BOX = 0.005  # distance of a finger from the box that it holds
 AWAY = 0.005  # a tool this far from where it grasped or released has left the box
 OPENED = 0.002  # by which the fingers must be wider beside a box than on it, rad or m
 SAME_POSITION, SAME_ANGLE = 1e-3, 1e-2  # keyframes and path tell the same
+SAME_GRASP = 1e-3  # distance of a tool from where a box's own grasp has it
 UPRIGHT = 0.05  # tilt (rad) up to which a box is upright on its way
 ROUNDING = 1e-3  # relative in velocities, absolute in joint positions
 
@@ -824,7 +825,10 @@ def _held(plan: Plan, events: Sequence[Event]) -> Iterator[Attachment]:
 
 
 def _grasps(plan: Plan, robot: Robot, events: Sequence[Event], motion: Motion) -> Iterator[Fault]:
-    """When a gripper takes hold of a box, fingers are at it on opposite sides of it."""
+    """When a gripper takes hold of a box, fingers are at it on opposite sides of it.
+
+    Of a box that has grasps of its own, it is one of them.
+    """
     with _World(plan, robot) as world:
         for taken in _taken(plan, events):
             box, gripper, row, _ = taken
@@ -839,6 +843,16 @@ def _grasps(plan: Plan, robot: Robot, events: Sequence[Event], motion: Motion) -
             if not {-1.0, 1.0} <= sides:
                 text = f"{gripper} does not have {box} between its fingers"
                 yield Fault("grasp", row, text)
+            given = plan.boxes[box].get("grasps")
+            now = _inverse(motion.boxes[box][row]) @ motion.tools[gripper][row]
+            if given and not any(_near(np.array(grasp), now) for grasp in given):
+                yield Fault("grasp", row, f"{gripper} holds {box} in none of its grasps")
+
+
+def _near(grasp: np.ndarray, now: np.ndarray) -> bool:
+    turn = Rotation.from_quat(grasp[3:]).inv() * Rotation.from_matrix(now[:3, :3])
+    way = float(np.linalg.norm(grasp[:3] - now[:3, 3]))
+    return way <= SAME_GRASP and turn.magnitude() <= SAME_ANGLE
 
 
 # --- collisions ----------------------------------------------------------------------------------

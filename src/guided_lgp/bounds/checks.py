@@ -9,7 +9,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
-from guided_lgp.poses import pose
+from guided_lgp.poses import Array, pose
 from guided_lgp.scene import Scene
 from guided_lgp.scene.shapes import Convex
 
@@ -43,6 +43,12 @@ def box_sizes(scene: Scene) -> Mapping[str, Vector]:
 def box_bodies(scene: Scene) -> Mapping[str, Convex]:
     """Every box that may be moved."""
     return {box.name: box.convex for box in scene.movable}
+
+
+@lru_cache(maxsize=64)
+def given_grasps(scene: Scene) -> Mapping[str, Array]:
+    """Grasps (n, 7) of the boxes for which the scene gives them: the tool in the box's frame."""
+    return {box.name: box.grasp_poses for box in scene.movable if box.grasps}
 
 
 @lru_cache(maxsize=64)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from guided_lgp.bounds.checks import Violation, box_bodies
+from guided_lgp.bounds.checks import Violation, box_bodies, given_grasps
 from guided_lgp.bounds.goals import GoalTerms
 from guided_lgp.bounds.results import Array, Trajectory
 from guided_lgp.bounds.verify.attachments import switches_of
@@ -176,8 +176,9 @@ class _Execution:
     def grasp(self, gripper: str, box: str) -> str:
         """Fix the box to the palm as they are; returns a fault if the gripper is not there."""
         tool, placement = self._tool(gripper), self._box(box)
-        body, arm = box_bodies(self._world.scene)[box], self._robot.arms[gripper]
-        faults = grasp_faults(arm, box, body, placement.tolist(), tool.tolist())
+        scene, arm = self._world.scene, self._robot.arms[gripper]
+        body, given = box_bodies(scene)[box], given_grasps(scene).get(box)
+        faults = grasp_faults(arm, box, body, placement.tolist(), tool.tolist(), given)
         if faults and faults[0].amount > GRASP_SLACK:
             return faults[0].constraint
         palm = self._world.links[arm.hand_links[0]]

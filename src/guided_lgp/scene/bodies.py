@@ -16,9 +16,9 @@ from pydantic import (
 )
 
 from guided_lgp.faults import Document, brief
-from guided_lgp.poses import Array, apply, pose, rotation_matrix
+from guided_lgp.poses import Array, apply, compose, pose, quaternion, rotation_matrix
 from guided_lgp.scene.shapes import Convex, Shape, Vector, hull, read_mesh
-from guided_lgp.scene.tolerances import LEVEL_ANGLE
+from guided_lgp.scene.tolerances import GRASP_ANGLE, GRASP_OFFSET, LEVEL_ANGLE
 
 
 def _no_more_than(most: float, hint: str) -> WrapValidator:
@@ -187,8 +187,13 @@ class Solid(Document):
 
     def _take_hull(self) -> None:
         vertices, origin = hull(np.array(self.vertices))
-        centre = _rounded(apply(self.placement, origin)) if origin.any() else self.position
-        self.become(vertices=_points(vertices), position=centre, size=_extents(vertices))
+        if origin.any():
+            self.become(position=_rounded(apply(self.placement, origin)))
+            self._move_frame(np.eye(3), origin)
+        self.become(vertices=_points(vertices), size=_extents(vertices))
+
+    def _move_frame(self, turn: Array, origin: Array) -> None:
+        """The body's frame is turned (3, 3) back, and then moved to an origin (3,)."""
 
     def become(self, **changes: object) -> None:
         """While the document is read, bring it into the form that the rest of it is in."""
@@ -208,8 +213,23 @@ class Box(Solid):
     grasp: Pose | None = Field(default=None, exclude_if=_is_default)
     """Of a body in a hand, whose gripper ``on`` names: pose ``[x, y, z, qx, qy, qz, qw]`` in the
     frame of the tool (x out of the palm, fingers close along y). By default, as deep as it goes."""
+    grasps: tuple[Pose, ...] = Field(default=(), exclude_if=_is_default)
+    """The ways in which hands may hold the body, and no others: poses of the tool's frame in the
+    body's. By default all that close on two of its upright sides."""
     fixed: bool = Field(default=False, strict=True, exclude_if=_is_default)
     """A body that others may stand on, but that nobody moves; ``on`` may then be left out."""
+
+    @property
+    def grasp_poses(self) -> Array:
+        """The given grasps (n, 7)."""
+        return np.array([(*grasp[:3], *_unit(grasp[3:])) for grasp in self.grasps])
+
+    @property
+    def grasp_widths(self) -> tuple[float, ...]:
+        """The sides (m) between the fingers: of each given grasp, or of those that there may be."""
+        closing = (rotation_matrix(grasp[3:])[:, 1] for grasp in self.grasp_poses)
+        given = tuple(self.size[int(np.argmax(np.abs(axis)))] for axis in closing)
+        return given or self.size[:2]
 
     @model_validator(mode="after")
     def _on_a_face(self) -> "Box":
@@ -222,8 +242,25 @@ class Box(Solid):
             self.become(quaternion=None, **turned)
         return self
 
+    @model_validator(mode="after")
+    def _known_grasps(self) -> "Box":
+        if self.fixed and self.grasps:
+            raise ValueError("grasps: nobody holds a fixed body")
+        for number, grasp in enumerate(self.grasp_poses):
+            fault = _grasp_fault(grasp)
+            if fault:
+                raise ValueError(f"grasps.{number}: {fault}")
+        return self
+
+    def _move_frame(self, turn: Array, origin: Array) -> None:
+        if self.grasps:
+            frame = np.array([*-origin, *quaternion(turn)])
+            moved = compose(frame, self.grasp_poses)
+            self.become(grasps=tuple(tuple(grasp) for grasp in moved.tolist()))
+
     def _turned_mesh(self, turn: Array) -> dict[str, object]:
         vertices, origin = hull(np.array(self.vertices) @ turn.T)
+        self._move_frame(turn, origin)
         centre = _rounded(np.array(self.position) + origin)
         points, size = _points(vertices), _extents(vertices)
         return {"vertices": points, "position": centre, "size": size, "yaw": 0.0}
@@ -236,7 +273,9 @@ class Box(Solid):
             raise ValueError("with this quaternion, the body has no flat face down")
         first, second = (axis for axis in range(3) if axis != up)
         size = self.size[first], self.size[second], self.size[up]
-        return {"size": size, "yaw": math.atan2(turn[1, first], turn[0, first])}
+        yaw = math.atan2(turn[1, first], turn[0, first])
+        self._move_frame(rotation_matrix(pose(np.zeros(3), -yaw)[3:]) @ turn, np.zeros(3))
+        return {"size": size, "yaw": yaw}
 
 
 Body = Table | Box | Obstacle
@@ -260,6 +299,17 @@ def _unit(quaternion: Quaternion) -> Array:
     if abs(length - 1) > _ROUNDED:
         raise ValueError(f"a quaternion has length 1, not {length:.3g}")
     return np.array(quaternion) / length
+
+
+def _grasp_fault(grasp: Array) -> str:
+    """Why no hand can hold a standing body so: at a pose (7,) of the tool in its frame."""
+    approach, closing, _ = rotation_matrix(grasp[3:]).T
+    if np.abs(closing[:2]).max() < math.cos(GRASP_ANGLE / 2):
+        return "the fingers close along neither x nor y of the body"
+    if abs(closing @ grasp[:3]) > GRASP_OFFSET / 2:
+        middle = 1e3 * abs(closing @ grasp[:3])
+        return f"the middle between the fingers is {middle:.1f} mm beside that of the body"
+    return "the hand comes from below" if approach[2] > math.sin(GRASP_ANGLE / 2) else ""
 
 
 def _points(points: Array) -> tuple[Vector, ...]:

@@ -4,9 +4,10 @@ import math
 
 import numpy as np
 
-from guided_lgp.poses import multiply, pose
+from guided_lgp.poses import inverse, multiply, pose
 from guided_lgp.robots import Arm
 from guided_lgp.scene.bodies import Box
+from guided_lgp.scene.tolerances import GRASP_ANGLE, GRASP_OFFSET
 
 _PALM_GAP = 0.002
 """Distance (m) of the palm from the body."""
@@ -23,6 +24,25 @@ def grasp_axes(size: tuple[float, float, float], widest: float) -> tuple[int, ..
     """
     order = (0, 1) if size[0] < size[1] else (1, 0)
     return tuple(axis for axis in order if size[axis] <= widest)
+
+
+def grasp_at_start(box: Box, arm: Arm) -> tuple[float, ...]:
+    """Pose (7,) of a box in the tool frame of a hand that holds it: the first of its own grasps.
+
+    Raises:
+        ValueError: it has none, and no side of the box is narrow enough.
+    """
+    if box.grasps:
+        return tuple(inverse(box.grasp_poses[0]).tolist())
+    return grasp_from_above(box, arm)
+
+
+def is_given(box: Box) -> bool:
+    """Whether a box is held, at the start, in one of its own grasps."""
+    tool = inverse(np.array(box.grasp))
+    way = np.linalg.norm(box.grasp_poses[:, :3] - tool[:3], axis=1)
+    turn = 2 * np.arccos(np.minimum(np.abs(box.grasp_poses[:, 3:] @ tool[3:]), 1.0))
+    return bool(np.any((way <= GRASP_OFFSET) & (turn <= GRASP_ANGLE)))
 
 
 def grasp_from_above(box: Box, arm: Arm) -> tuple[float, ...]:

@@ -27,7 +27,7 @@ from guided_lgp.logic import State, Symbols
 from guided_lgp.poses import Array, compose, pose, quaternion
 from guided_lgp.robots import Robot, load_robot, tilted_robot
 from guided_lgp.scene.bodies import Angle, Body, Box, Coordinate, Obstacle, Table
-from guided_lgp.scene.grasps import grasp_from_above
+from guided_lgp.scene.grasps import grasp_at_start, is_given
 from guided_lgp.scene.shapes import Convex
 
 _LEVEL = 1e-9
@@ -275,8 +275,10 @@ class Scene(Document):
         boxes = {box.name: box for box in self.movable}
         for name, gripper in self.held.items():
             if boxes[name].grasp is None:
-                grasp = grasp_from_above(boxes[name], self.robot.description.arms[gripper])
+                grasp = grasp_at_start(boxes[name], self.robot.description.arms[gripper])
                 boxes[name].become(grasp=grasp)
+            elif boxes[name].grasps and not is_given(boxes[name]):
+                raise ValueError(f"box {name!r}: grasp is none of its grasps")
         return self
 
 

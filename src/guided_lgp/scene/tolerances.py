@@ -13,6 +13,10 @@ HEIGHT = 0.003
 """... and in a plan, where it is computed anew."""
 LEVEL_ANGLE = 0.02
 """Tilt (rad) up to which a box at rest is level."""
+GRASP_OFFSET = 0.003
+"""How far (m) a grasped box may be off the middle between the fingers in a plan ..."""
+GRASP_ANGLE = 0.03
+"""... and its side (rad) off their closing direction; a given grasp may be half as far off."""
 BALANCE_INSET = 0.005
 """How far (m) inside the support's top a centre of mass lies at least, where a plan puts it. In a
 scene, and as long as a stack stands as it did there, it has to be above the top and no more."""

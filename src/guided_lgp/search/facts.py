@@ -29,7 +29,6 @@ from guided_lgp.logic.objectives import parents_wanted_by
 from guided_lgp.robots import Robot
 from guided_lgp.scene.bodies import Box
 from guided_lgp.scene.footprints import footprint, gap
-from guided_lgp.scene.grasps import grasp_axes
 from guided_lgp.scene.tolerances import MARGIN
 from guided_lgp.search.conflicts import Conflicts
 
@@ -132,12 +131,12 @@ class TaskFacts:
 
     def _stuck(self, body: str) -> Iterator[Finding]:
         """Why no arm can move a body from the furniture that it stands on."""
-        size = self._boxes[body].size
+        narrowest = min(self._boxes[body].grasp_widths)
         widest = max(arm.fingers.grasp_width for arm in self._robot.arms.values())
-        if not grasp_axes(size, widest):
+        if narrowest > widest:
             yield Finding(
                 "width",
-                f"{body} is too wide for the fingers: {min(size[:2]):.3f} m at its narrowest side",
+                f"{body} is too wide for the fingers: {narrowest:.3f} m at its narrowest side",
                 f"a side of at most {widest:.3f} m",
             )
         if all(map(self._bounds.out_of_reach, ((move,) for move in self._takings(body)))):

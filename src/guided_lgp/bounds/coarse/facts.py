@@ -14,7 +14,7 @@ from guided_lgp.bounds.coarse.formulation import straight_lines
 from guided_lgp.bounds.coarse.reach import Grasp, Limb
 from guided_lgp.bounds.program.context import Line
 from guided_lgp.bounds.program.geometry import GraspSide, SceneGeometry
-from guided_lgp.bounds.program.grasp import INSET, PALM_GAP
+from guided_lgp.bounds.program.grasp import INSET, PALM_GAP, grasp_sides
 from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.bounds.results import Array
 from guided_lgp.logic import Skeleton, successor
@@ -56,14 +56,17 @@ class Facts:
         return next((hold for hold in self._holds(skeleton) if self._known.get(hold)), None)
 
     def out_of_reach(self, hold: Hold) -> bool:
-        """Whether the arm cannot do it, collisions aside; boxes too wide for the fingers aside."""
+        """Whether the arm cannot do it, collisions aside; boxes too wide for the fingers aside.
+
+        Of boxes whose grasps are given, nothing is known.
+        """
         if hold not in self._known:
             limb = self._limbs[hold.gripper]
-            widest = self._arms[hold.gripper].arm.fingers.grasp_width
-            sides = self._geometry.grasp_sides(hold.box, widest)
+            sides = grasp_sides(self._geometry, hold.box, self._arms[hold.gripper].arm)
             self._known[hold] = (
                 limb is not None
                 and bool(sides)
+                and sides[0].given is None
                 and all(limb.cannot(self._grasp(hold, side)) for side in sides)
             )
         return self._known[hold]

@@ -1,7 +1,7 @@
 """The discrete choices in the program of a skeleton, which starts make in turns.
 
-A grip closes on one of the pairs of sides that the hand can take. Below something, a box comes and
-goes by a low straight way as well as from above.
+A grip closes on one of the pairs of sides that the hand can take, or is one of the given grasps.
+Below something, a box comes and goes by a low straight way as well as from above.
 """
 
 from collections.abc import Iterator, Sequence
@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from guided_lgp.bounds.program.geometry import SceneGeometry
+from guided_lgp.bounds.program.grasp import grasp_sides
 from guided_lgp.logic import Skeleton, State, successor
 from guided_lgp.logic.domain import GroundInstruction
 
@@ -61,7 +62,7 @@ def _sides(geometry: SceneGeometry, ground: GroundInstruction) -> Iterator[int]:
     """On how many sides the grip that an action begins can close; 1 where it is on none."""
     arm = geometry.scene.robot.description.arms.get(ground.parent)
     if arm is not None:
-        yield max(1, len(geometry.grasp_sides(ground.body, arm.fingers.grasp_width)))
+        yield max(1, len(grasp_sides(geometry, ground.body, arm)))
 
 
 def _ways(geometry: SceneGeometry, grounds: Sequence[GroundInstruction]) -> Iterator[int]:

@@ -58,7 +58,8 @@ class ContactSampler:
         action = self._task.manoeuvres[index]
         body = action.body
         central, others = self._task.grips[action.parent, body][width]
-        if width == self._task.widths(index)[0]:
+        given = self._task.boxes[body].grasps
+        if not given and width == self._task.widths(index)[0]:
             central += self._coarse_grip(index)
         box = situation.boxes(self._task.arms)[body]
         for strategy, grips in product(STRATEGIES, (central, others)):

@@ -8,6 +8,7 @@ import numpy as np
 
 from guided_lgp.bounds.program.grasp import INSET, PALM_GAP
 from guided_lgp.bounds.results import Array
+from guided_lgp.poses import rotation_matrix
 from guided_lgp.robots import Arm
 from guided_lgp.scene import Box
 from guided_lgp.scene.grasps import grasp_axes
@@ -50,9 +51,19 @@ def grips_of(box: Box, arm: Arm) -> dict[float, tuple[Grips, Grips]]:
     """The grips of a box, by its width (m) between the fingers.
 
     Grids over sides of the box, pitch and flip of the hand: the deep and centred grips, and all
-    others. Nothing for a box that is too wide for the hand.
+    others. Nothing for a box that is too wide for the hand; where the scene gives grasps, these.
     """
+    if box.grasps:
+        return _given(box, arm.fingers.grasp_width)
     return _grips(box.convex, arm.palm_front, arm.fingers.grasp_width)
+
+
+def _given(box: Box, widest: float) -> dict[float, tuple[Grips, Grips]]:
+    found: dict[float, list[_Frame]] = {}
+    for grasp, width in zip(box.grasp_poses, box.grasp_widths, strict=True):
+        if width <= widest:
+            found.setdefault(width, []).append((rotation_matrix(grasp[3:]), grasp[:3]))
+    return {width: (_stacked(frames), _stacked([])) for width, frames in found.items()}
 
 
 @cache

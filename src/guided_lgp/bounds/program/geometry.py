@@ -55,6 +55,8 @@ class GraspSide:
     """From one to the other (m)."""
     touched: tuple[float, float]
     """Half extents (m) of what fingertips may touch, along the length and in height."""
+    given: tuple[float, float, float] | None = None
+    """Pitch, offset and depth of the one grasp on it, where the scene gives the grasps."""
 
 
 class SceneGeometry:
@@ -62,6 +64,7 @@ class SceneGeometry:
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
+        self.movable = {box.name: box for box in scene.movable}
         self.domain = scene.symbols.domain
         to_robot = inverse(scene.robot.level_pose)
         self._turn = float(yaw_of(to_robot))
@@ -120,7 +123,10 @@ class SceneGeometry:
         return np.array([*position, 0.0, 0.0, math.sin(half), math.cos(half)])
 
     def grasp_sides(self, name: str, widest: float) -> tuple[GraspSide, ...]:
-        """The sides of a box that fingers, open up to ``widest`` (m), can close on."""
+        """The sides of a box that fingers, open up to ``widest`` (m), can close on.
+
+        Where they touch it, is the scene's matter if that gives the grasps.
+        """
         body = self.bodies[name]
         (hx, hy, hz), (along_y, along_x) = body.half, body.sides
         sides = (
@@ -128,7 +134,8 @@ class SceneGeometry:
             GraspSide(0.0, hx, 2 * hy, along_x[::2]),
         )
         order = grasp_axes((2 * hx, 2 * hy, 2 * hz), widest)
-        return tuple(sides[axis] for axis in order if min(sides[axis].touched) > 0)
+        given = bool(self.movable[name].grasps)
+        return tuple(sides[axis] for axis in order if given or min(sides[axis].touched) > 0)
 
 
 _SHOULDER = 0.1

@@ -16,11 +16,13 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from guided_lgp.bounds.program.geometry import GraspSide
+from guided_lgp.bounds.program.geometry import GraspSide, SceneGeometry
 from guided_lgp.bounds.program.kernels import absolute
 from guided_lgp.bounds.program.slots import HeldBox
 from guided_lgp.bounds.results import Array
-from guided_lgp.poses import multiply, pose
+from guided_lgp.poses import inverse, multiply, pose
+from guided_lgp.robots import Arm
+from guided_lgp.scene.tolerances import GRASP_ANGLE, GRASP_OFFSET
 
 PALM_GAP = 0.002
 """Least distance of the box's nearest corner from the palm (m)."""
@@ -32,6 +34,24 @@ _SAME = 1e-4
 """Difference (m, or sine of half an angle) of poses that are one."""
 Hand = tuple[float, float]
 """Offset of a hand and its depth (m)."""
+Grip = tuple[float, float, float]
+"""Pitch (rad), offset and depth (m)."""
+
+
+def grasp_sides(geometry: SceneGeometry, box: str, arm: Arm) -> tuple[GraspSide, ...]:
+    """The sides of a box that a hand can close on; one for each grasp, where these are given."""
+    sides, half_height = (
+        geometry.grasp_sides(box, arm.fingers.grasp_width),
+        geometry.bodies[box].half[2],
+    )
+    body = geometry.movable[box]
+    if not body.grasps:
+        return sides
+    found = (
+        read_grip(grasp, sides, half_height, arm.palm_front, loosely=True)
+        for grasp in inverse(body.grasp_poses)
+    )
+    return tuple(replace(side, given=grip) for side, grip in filter(None, found))
 
 
 def tool_target(pose: Any, height: Any, grip: Any, p: Any, palm_front: float) -> tuple[Any, Any]:
@@ -101,17 +121,24 @@ def in_tool(held: HeldBox, values: Array, palm_front: float) -> Array:
 
 
 def read_grip(
-    grasp: Array, sides: Sequence[GraspSide], half_height: float, palm_front: float
-) -> tuple[GraspSide, tuple[float, float, float]] | None:
+    grasp: Array,
+    sides: Sequence[GraspSide],
+    half_height: float,
+    palm_front: float,
+    loosely: bool = False,
+) -> tuple[GraspSide, Grip] | None:
     """The side, and pitch, offset and depth, of the pose (7,) of a box in the tool frame.
 
-    The inverse of :func:`in_tool`; None if the hand does not hold the box so.
+    The inverse of :func:`in_tool`; None if the hand does not hold the box so, or ``loosely``: if it
+    holds it farther from there than a grasp may be off.
     """
+    off, turned_off = (GRASP_OFFSET, GRASP_ANGLE / 2) if loosely else (_SAME, _SAME)
     for side, about in product(sides, (0.0, np.pi)):
         turned = replace(side, turn=side.turn + about)
         x, y, z, w = multiply(grasp[3:], pose((0, 0, 0), turned.turn)[3:]).tolist()
-        pitch = float(2 * np.arctan2(-y, w) % (2 * np.pi))
-        if max(abs(x), abs(z), abs(grasp[1])) < _SAME and pitch <= np.pi + _SAME:
+        pitch = float((2 * np.arctan2(-y, w) + np.pi / 2) % (2 * np.pi) - np.pi / 2)
+        across = max(abs(x), abs(z)) < turned_off and abs(grasp[1]) < off
+        if across and -turned_off <= pitch <= np.pi + turned_off:
             reach = side.half_length * abs(np.cos(pitch)) + half_height * np.sin(pitch)
             return turned, (pitch, float(grasp[2]), float(grasp[0] - reach - palm_front))
     return None

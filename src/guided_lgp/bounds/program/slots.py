@@ -73,7 +73,7 @@ class HeldBox:
     closed: float
     """How far (m) each finger is from wide open while the hand comes and leaves."""
     given: tuple[float, float, float] | None = None
-    """Pitch, offset and depth of a grasp that the scene begins with."""
+    """Pitch, offset and depth of a grasp that the scene gives, or begins with."""
     configurations: list[ArmConfiguration] = field(default_factory=list)
 
     @property

@@ -13,7 +13,15 @@ import numpy as np
 from guided_lgp.bounds.checks import Pose, Vector, angle_of, axes_of, closing_axis, dot, offset_of
 from guided_lgp.bounds.program.context import Context, Line
 from guided_lgp.bounds.program.draft import Draft
-from guided_lgp.bounds.program.grasp import INSET, PALM_GAP, read_grip, tool_target
+from guided_lgp.bounds.program.geometry import GraspSide
+from guided_lgp.bounds.program.grasp import (
+    INSET,
+    PALM_GAP,
+    Grip,
+    grasp_sides,
+    read_grip,
+    tool_target,
+)
 from guided_lgp.bounds.program.kernels import SCALE, Kernel, kernel
 from guided_lgp.bounds.program.kinematics import Chain, RobotKinematics
 from guided_lgp.bounds.program.slots import (
@@ -25,12 +33,8 @@ from guided_lgp.bounds.program.slots import (
 from guided_lgp.bounds.results import Array
 from guided_lgp.bounds.terms.term import Term, UngraspableError
 from guided_lgp.errors import InputError
-from guided_lgp.scene.tolerances import MARGIN
-
-GRASP_OFFSET = 0.003
-"""How far (m) a grasped box may be off the middle between the fingers."""
-GRASP_ANGLE = 0.03
-"""How far (rad) its side may be off the fingers' closing direction."""
+from guided_lgp.poses import compose
+from guided_lgp.scene.tolerances import GRASP_ANGLE, GRASP_OFFSET, MARGIN
 
 
 def _kernel(chain: Chain, fixed: int) -> Kernel:
@@ -89,11 +93,13 @@ def grip(context: Context, gripper: str, box: str) -> HeldBox:
 
 def _new_grip(context: Context, gripper: str, box: str) -> HeldBox:
     arm = context.robot.arms[gripper].arm
-    sides = context.geometry.grasp_sides(box, arm.fingers.grasp_width)
+    sides = grasp_sides(context.geometry, box, arm)
     if not sides:
-        excess = 2 * min(context.half(box)[:2]) - arm.fingers.grasp_width
-        raise UngraspableError(context.action, box, excess)
+        narrowest = min(context.geometry.movable[box].grasp_widths)
+        raise UngraspableError(context.action, box, narrowest - arm.fingers.grasp_width)
     side = context.next_side(sides)
+    if side.given is not None:
+        return _given_grip(context, gripper, box, side, side.given)
     height = context.half(box)[2]
     slide = max(side.half_length, height) - INSET
     deepest = max(PALM_GAP, INSET - arm.palm_front - 2 * min(side.half_length, height))
@@ -116,18 +122,24 @@ def take_over(context: Context, gripper: str, box: str) -> None:
         InputError: that is none of the ways in which hands hold boxes.
     """
     arm = context.robot.arms[gripper].arm
-    body = next(body for body in context.geometry.scene.movable if body.name == box)
+    body = context.geometry.movable[box]
     sides = context.geometry.grasp_sides(box, arm.fingers.grasp_width)
-    found = read_grip(np.array(body.grasp), sides, context.half(box)[2], arm.palm_front)
+    half_height, grasp = context.half(box)[2], np.array(body.grasp)
+    found = read_grip(grasp, sides, half_height, arm.palm_front, loosely=bool(body.grasps))
     if found is None:
         accepted = "fingers across upright sides, the body level when the hand points down or ahead"
         raise InputError(f"{box}.grasp", f"{gripper} does not hold the body so", accepted)
-    side, given = found
-    pitch, offset, depth = (context.program.variable(v, v, 1e-3, v) for v in given)
-    closed = (arm.fingers.widest - arm.fingers.opening_for(side.width)) / 2
-    held = HeldBox(gripper, box, pitch, offset, depth, side, context.half(box)[2], closed, given)
+    held = _given_grip(context, gripper, box, *found)
     context.hands[gripper] = context.held[box] = held
     context.grips.append(held)
+
+
+def _given_grip(context: Context, gripper: str, box: str, side: GraspSide, given: Grip) -> HeldBox:
+    """A grasp that leaves nothing to choose."""
+    fingers = context.robot.arms[gripper].arm.fingers
+    pitch, offset, depth = (context.program.variable(v, v, 1e-3, v) for v in given)
+    closed = (fingers.widest - fingers.opening_for(side.width)) / 2
+    return HeldBox(gripper, box, pitch, offset, depth, side, context.half(box)[2], closed, given)
 
 
 def configuration(
@@ -289,6 +301,20 @@ def check(size: Vector, placement: Pose, tool: Pose, palm_front: float, widest: 
         palm_front - MARGIN - reach,
         size[across] - widest,
     )
+
+
+def check_given(placement: Pose, tool: Pose, given: Array) -> float:
+    """By how much (m or rad) a hand is at none of the given grasps: negative where it is at one.
+
+    Args:
+        placement: pose of the box.
+        tool: pose of the gripper's tool frame.
+        given: (n, 7) poses of the tool frame in the box's.
+    """
+    there, now = compose(np.asarray(placement), given), np.asarray(tool)
+    way = np.linalg.norm(there[:, :3] - now[:3], axis=1)
+    turn = 2 * np.arccos(np.minimum(np.abs(there[:, 3:] @ now[3:]), 1.0))
+    return float(np.maximum(way - GRASP_OFFSET, turn - GRASP_ANGLE).min())
 
 
 TERM = Term(_add, _kernels)

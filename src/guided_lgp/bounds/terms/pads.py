@@ -34,8 +34,13 @@ def _kernels(robot: RobotKinematics) -> tuple[Kernel, ...]:
 
 
 def _add(context: Context, gripper: str, box: str) -> None:
-    """On a grasp's variables alone: one constraint for all configurations of its mode."""
+    """On a grasp's variables alone: one constraint for all configurations of its mode.
+
+    What grasps the scene gives is the scene's matter.
+    """
     held = grip(context, gripper, box)
+    if held.given is not None:
+        return
     context.rows(
         f"pads_{context.robot.arms[gripper].chain.name}",
         held.grip,

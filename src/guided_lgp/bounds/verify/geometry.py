@@ -4,6 +4,7 @@ import math
 from collections.abc import Collection, Mapping
 
 from guided_lgp.bounds.checks import Pose, Violation, box_sizes, top_of, volumes
+from guided_lgp.bounds.results import Array
 from guided_lgp.bounds.terms import balanced, hold, pads, stand
 from guided_lgp.robots import Arm, Robot
 from guided_lgp.scene import Scene
@@ -19,8 +20,12 @@ _SAME = 1e-6
 """Distance (m) of places that are one, but for rounding."""
 
 
-def grasp_faults(arm: Arm, box: str, body: Convex, placement: Pose, tool: Pose) -> list[Violation]:
+def grasp_faults(
+    arm: Arm, box: str, body: Convex, placement: Pose, tool: Pose, given: Array | None = None
+) -> list[Violation]:
     """Whether the gripper holds the box: closing across it, fingertips on it, palm outside.
+
+    Where the scene gives the grasps: whether it is at one of them.
 
     Args:
         arm: of the gripper.
@@ -28,15 +33,19 @@ def grasp_faults(arm: Arm, box: str, body: Convex, placement: Pose, tool: Pose) 
         body: what it is.
         placement: its pose.
         tool: pose of the gripper's tool frame.
+        given: (n, 7) the box's own grasps, if it has some.
 
     Returns:
         The greater violation first.
     """
-    excess = {
+    if given is not None:
+        excess = hold.check_given(placement, tool, given)
+        return [Violation(f"hold {arm.gripper} {box}", excess)] if excess > 0 else []
+    excesses = {
         "hold": hold.check(body.size, placement, tool, arm.palm_front, arm.fingers.grasp_width),
         "pads": pads.check(body, placement, tool),
     }
-    found = [Violation(f"{term} {arm.gripper} {box}", e) for term, e in excess.items() if e > 0]
+    found = [Violation(f"{term} {arm.gripper} {box}", e) for term, e in excesses.items() if e > 0]
     return sorted(found, key=lambda violation: -violation.amount)
 
 

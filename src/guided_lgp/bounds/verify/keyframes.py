@@ -5,7 +5,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from guided_lgp.bounds.checks import Violation, body_names, box_bodies, closing_axis, overlap_name
+from guided_lgp.bounds.checks import (
+    Violation,
+    body_names,
+    box_bodies,
+    closing_axis,
+    given_grasps,
+    overlap_name,
+)
 from guided_lgp.bounds.results import Array, Keyframe
 from guided_lgp.bounds.terms import carried
 from guided_lgp.bounds.terms.carried import Relative, relative
@@ -37,6 +44,7 @@ def verify_keyframe(
     held = tuple(dict.fromkeys((*state.held, *after.held)))
     support = dict(state.support) | dict(after.support)
     convex, robot = box_bodies(world.scene), world.scene.robot.description
+    given = given_grasps(world.scene)
     boxes = {name: keyframe.boxes[name].tolist() for name in convex}
     if not math.isfinite(sum(map(sum, boxes.values()))):
         return [Violation("finite pose", math.nan)]
@@ -50,7 +58,7 @@ def verify_keyframe(
             keeps = (box, gripper) in state.held and (box, gripper) in after.held
             value = arm.fingers.value if keeps else arm.fingers.value_around
             world.set_fingers({gripper: value(width)})
-            violations += grasp_faults(arm, box, convex[box], boxes[box], tool)
+            violations += grasp_faults(arm, box, convex[box], boxes[box], tool, given.get(box))
     violations += placement_faults(world.scene, boxes, support)
     bodies = body_names(world.scene)
     violations += [

@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from guided_lgp.bounds.checks import Violation, body_names, box_bodies, overlap_name
+from guided_lgp.bounds.checks import Violation, body_names, box_bodies, given_grasps, overlap_name
 from guided_lgp.bounds.collision import PlanningScene, checker_of
 from guided_lgp.bounds.goals import NO_TERMS, GoalTerms
 from guided_lgp.bounds.results import Array, Trajectory
@@ -154,12 +154,13 @@ def _contact_fault(phase: Phase, after: State) -> Violation | None:
     """A grasp or placement at the end of a phase, of the modes before and after its switch."""
     scene, state = phase.scene, phase.state
     poses = {name: placement.tolist() for name, placement in phase.boxes_at(-1).items()}
+    given = given_grasps(scene)
     held, arms, tools = box_bodies(scene), scene.robot.description.arms, phase.tools_at(-1)
     faults = [
         fault
         for box, gripper in dict.fromkeys((*state.held, *after.held))
         for fault in grasp_faults(
-            arms[gripper], box, held[box], poses[box], tools[gripper].tolist()
+            arms[gripper], box, held[box], poses[box], tools[gripper].tolist(), given.get(box)
         )
     ]
     faults += placement_faults(scene, poses, dict(state.support) | dict(after.support))
