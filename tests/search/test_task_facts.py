@@ -78,6 +78,28 @@ def test_no_room_by_area() -> None:
     assert facts(many, *goals[:7]).before_search() is None
 
 
+def roofed(room: float, **changes: object) -> Scene:
+    """A shelf whose lid is some metres above its board; the box is 0.1 m high."""
+    scene = load_scene(ROOT / "tests" / "cases" / "into_low_shelf.json")
+    left, board, lid = scene.tables
+    z = board.position[2] + room + 0.04
+    moved = lid.model_copy(update={"position": (*lid.position[:2], z), **changes})
+    return scene.model_copy(update={"tables": (left, board, moved)})
+
+
+def test_no_room_below_something_low() -> None:
+    finding = found(facts(roofed(0.09), "(on red board)").before_search())
+    assert finding.kind == "room"
+    assert finding.text.startswith("no room on board for red: it is 0.100 m high, and lid covers")
+    assert finding.text.endswith("covers all of board 0.090 m above it")
+    assert facts(roofed(0.11), "(on red board)").before_search() is None, "high enough"
+    assert facts(roofed(0.09), "(on red left)").before_search() is None, "not below it"
+    small = roofed(0.09, half_extents=(0.1, 0.1))
+    assert facts(small, "(on red board)").before_search() is None, "beside the lid"
+    turned = roofed(0.09, yaw=0.1)
+    assert facts(turned, "(on red board)").before_search() is None, "at its corners"
+
+
 def test_who_reaches_what() -> None:
     task = facts(FAR, "(on parcel farright)")
     assert task.before_search() is None

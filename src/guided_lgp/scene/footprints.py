@@ -3,22 +3,22 @@
 import numpy as np
 
 from guided_lgp.poses import Array
-from guided_lgp.scene.bodies import Box, Table
+from guided_lgp.scene.bodies import Body
 
 _CORNERS = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
 
 
-def footprint(body: Box | Table) -> Array:
+def footprint(body: Body) -> Array:
     """Corners (4, 2) of a level body in the world, counter-clockwise."""
     return _corners(body, body.convex.half[:2])
 
 
-def seat(body: Box | Table) -> Array:
+def seat(body: Body) -> Array:
     """Corners (4, 2) of the part of its top that may carry centres of mass."""
     return _corners(body, body.convex.rest)
 
 
-def _corners(body: Box | Table, half: tuple[float, float]) -> Array:
+def _corners(body: Body, half: tuple[float, float]) -> Array:
     return np.asarray(body.position[:2] + _CORNERS * np.array(half) @ _turn(body.yaw).T)
 
 

@@ -27,8 +27,8 @@ from guided_lgp.logic import (
 from guided_lgp.logic.grounding import ground_instructions
 from guided_lgp.logic.objectives import parents_wanted_by
 from guided_lgp.robots import Robot
-from guided_lgp.scene.bodies import Box
-from guided_lgp.scene.footprints import footprint, gap
+from guided_lgp.scene.bodies import Body, Box, Table
+from guided_lgp.scene.footprints import footprint, gap, inset, seat
 from guided_lgp.scene.tolerances import MARGIN
 from guided_lgp.search.conflicts import Conflicts
 
@@ -46,6 +46,8 @@ KINDS: dict[Kind, str] = {
 
 _FINGERS = 0.03
 """Gap (m) between boxes into which no finger fits."""
+_ROUNDING = 1e-6
+"""By how much (m) numbers of a scene that should be the same may differ."""
 
 
 @dataclass(frozen=True)
@@ -117,6 +119,7 @@ class TaskFacts:
                 yield from self._stuck(body)
             if self._denied(body, parents):
                 yield self._out_of_reach(" and ".join(sorted(parents)))
+            yield from self._too_low(body, parents)
         for support in self._symbols.tables:
             yield from self._crowded(support)
 
@@ -155,6 +158,38 @@ class TaskFacts:
     def _out_of_reach(self, names: str) -> Finding:
         text = f"{names} is out of reach of {self._every_arm}"
         return Finding("reach", text, f"move {names} or the robot")
+
+    def _too_low(self, body: str, parents: frozenset[str]) -> Iterator[Finding]:
+        """Furniture where a body cannot stand, since something covers it that is too low.
+
+        Where a body is put down, the centre of mass of all that hangs on it is above the support
+        and inside the body: above that point, body and cover would meet.
+        """
+        box = self._boxes[body]
+        supports = {one.name: one for one in self.scene.supports if one.name in parents}
+        covers = {name: self._cover(support, box) for name, support in supports.items()}
+        if len(supports) < len(parents):
+            return
+        for name, cover in covers.items():
+            if cover is None:
+                return
+            room = cover.placement[2] - cover.convex.half[2] - supports[name].top[2]
+            yield Finding(
+                "room",
+                f"no room on {name} for {body}: it is {box.size[2]:.3f} m high, and {cover.name} "
+                f"covers all of {name} {room:.3f} m above it",
+                f"a higher {cover.name}, or a lower {body}",
+            )
+
+    def _cover(self, support: Table | Box, box: Box) -> Body | None:
+        """What is above all of a support, but not as high above it as a box is high."""
+        top, level = support.top[2], (o for o in self.scene.obstacles if o.quaternion is None)
+        for other in (*self.scene.supports, *level):
+            bottom = other.placement[2] - other.convex.half[2]
+            low = top < bottom < top + box.size[2] - MARGIN
+            if low and inset(seat(other), seat(support)).min() >= -_ROUNDING:
+                return other
+        return None
 
     def _crowded(self, support: str) -> Iterator[Finding]:
         """Boxes of which goals want too many on one support, however they are turned.
