@@ -36,6 +36,7 @@ from guided_lgp.policy.registry import (
 )
 from guided_lgp.policy.uniform import Uniform
 from guided_lgp.scene import Scene, load_scene
+from guided_lgp.scene.contradictions import check_places
 from guided_lgp.scene.goals import complete_objective, in_the_way
 from guided_lgp.scene.validate import validate_scene
 from guided_lgp.scene.world import initial_poses
@@ -163,6 +164,7 @@ def plan(
     prefix = read_skeleton(skeleton, scene.symbols, scene.state)
     if goals or not prefix:
         check_objective(goals, scene.symbols)
+        check_places(goals, scene)
     misplaced = _misplaced(scene, goals)
     if not prefix and satisfied(scene.state, goals) and not misplaced:
         return _without_search(scene, goals, stay(scene))

@@ -7,6 +7,7 @@ import pytest
 from guided_lgp.errors import InputError
 from guided_lgp.logic import parse_objective
 from guided_lgp.scene import load_scene
+from guided_lgp.scene.contradictions import check_places
 from guided_lgp.scene.goals import complete_objective, in_the_way
 
 SCENE = load_scene(Path(__file__).parents[2] / "examples" / "three_boxes.json")
@@ -51,3 +52,37 @@ def test_what_stands_where_a_box_is_wanted() -> None:
     on_green = parse_objective(["(at red green 0.5 -0.25 0.75 0)"])
     assert in_the_way("red", on_green, SCENE) == frozenset()
     assert in_the_way("red", parse_objective(["(in red tab2 -0.1 -0.1 0.1 0.1)"]), SCENE) == set()
+
+
+@pytest.mark.parametrize(
+    ("goals", "fault"),
+    [
+        ("(at red 0.5 -0.3 0.65 0) (at red 0.6 -0.3 0.65 0)", "red is in one place only"),
+        ("(at red 0.5 -0.3 0.65 0) (at red 0.5 -0.3 0.65 1)", "red is in one place only"),
+        ("(at red 0.5 -0.3 0.65 0) (at blue 0.52 -0.3 0.65 1)", "red and blue would be in each"),
+        ("(in red tab2 0 0 0.1 0.1) (in red tab2 -0.1 -0.1 0 0)", "red is in one place only"),
+        ("(at red 0.5 -0.3 0.65 0) (in red tab2 0.1 0.1 0.3 0.3)", "red is in one place only"),
+        ("(in red tab2 0 0 0.05 0.3)", r"no room for red \(accepted: 0.070 m or more"),
+        ("(in red tab2 0.4 0 0.6 0.2)", "the region is beside tab2"),
+    ],
+)
+def test_places_that_contradict_each_other_are_told(goals: str, fault: str) -> None:
+    objective = parse_objective(f"{goal})" for goal in goals.split(")")[:-1])
+    with pytest.raises(InputError, match=fault):
+        check_places(complete_objective(objective, SCENE), SCENE)
+
+
+@pytest.mark.parametrize(
+    "goals",
+    [
+        ["(at red 0.5 -0.3 0.65 0)", "(at red 0.505 -0.3 0.65 0.05)"],
+        ["(at red 0.5 -0.3 0.65 0)", "(at blue 0.5 -0.38 0.65 0)"],
+        ["(at red 0.5 -0.25 0.75 0)", "(at green 0.5 -0.25 0.65 0)"],
+        ["(at red 0.5 -0.3 0.65 0)", "(in red tab2 -0.2 -0.2 0.2 0.2)"],
+        ["(in red tab2 0 0 0.1 0.2)", "(in red tab2 -0.1 -0.1 0.08 0.2)"],
+        # on a box that moves, a region moves too, but the pose is in the world
+        ["(at red 0.5 -0.25 0.75 0)", "(in red green -0.2 -0.2 0.2 0.2)"],
+    ],
+)
+def test_places_that_can_hold_together_are_not_refused(goals: list[str]) -> None:
+    check_places(complete_objective(parse_objective(goals), SCENE), SCENE)

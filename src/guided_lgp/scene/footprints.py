@@ -18,6 +18,12 @@ def seat(body: Body) -> Array:
     return _corners(body, body.convex.rest)
 
 
+def inner_radius(body: Body) -> float:
+    """Of a disc (m) around its middle that a body has to itself, from its base to its top."""
+    convex = body.convex
+    return min(convex.rest if convex.shape == "mesh" else convex.half[:2])
+
+
 def _corners(body: Body, half: tuple[float, float]) -> Array:
     return np.asarray(body.position[:2] + _CORNERS * np.array(half) @ _turn(body.yaw).T)
 

@@ -28,7 +28,7 @@ from guided_lgp.logic.grounding import ground_instructions
 from guided_lgp.logic.objectives import parents_wanted_by
 from guided_lgp.robots import Robot
 from guided_lgp.scene.bodies import Body, Box, Table
-from guided_lgp.scene.footprints import footprint, gap, inset, seat
+from guided_lgp.scene.footprints import footprint, gap, inner_radius, inset, seat
 from guided_lgp.scene.tolerances import MARGIN
 from guided_lgp.search.conflicts import Conflicts
 
@@ -202,7 +202,7 @@ class TaskFacts:
         half = np.array(self._rest(support)) + (spare > 0) * _longest(boxes)
         for i, one in enumerate(boxes):
             for other in boxes[:i]:
-                need = _shortest(one) + _shortest(other) - MARGIN
+                need = inner_radius(one) + inner_radius(other) - MARGIN
                 most = 2 * float(np.hypot(*half))
                 if need > most:
                     yield Finding(
@@ -345,11 +345,6 @@ class TaskFacts:
     def _every_arm(self) -> str:
         count = len(self._symbols.grippers)
         return {1: "the arm", 2: "both arms"}.get(count, f"all {count} arms")
-
-
-def _shortest(box: Box) -> float:
-    """Radius (m) of the largest disc in a box seen from above."""
-    return min(box.convex.rest if box.shape == "mesh" else box.convex.half[:2])
 
 
 def _longest(boxes: Iterable[Box]) -> float:
