@@ -1,5 +1,6 @@
 """A robot from its file: the file's values, and what the description says besides."""
 
+import logging
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TypeVar
@@ -21,8 +22,13 @@ from guided_lgp.robots.measures.mirror import mirror_of
 from guided_lgp.robots.robot import Arm, Fingers, Gap, Robot, Sphere, TurningGap
 
 _TWO_TURNS = (-2 * np.pi, 2 * np.pi)
+_ACCELERATION = 2.0
+"""Limits of acceleration over those of velocity (1/s) that no file states: full speed in half a
+second."""
 _MIRROR_ERROR = 1e-3
 """How far (m) the tools of two arms may be apart that are said to be mirror images."""
+
+logger = logging.getLogger(__name__)
 
 T = TypeVar("T")
 
@@ -36,6 +42,7 @@ def read_robot(file: Path) -> Robot:
     document = read_document(file)
     description = find_description(file, document.description)
     _check(document, description)
+    _tell_defaults(document, description)
     arms, joint, finger = {}, 0, sum(len(arm.joints) for arm in document.arms.values())
     for gripper, arm in document.arms.items():
         arms[gripper] = _arm(gripper, arm, document, description, joint, finger)
@@ -48,7 +55,20 @@ def read_robot(file: Path) -> Robot:
         stand=document.stand,
         fixed_joints=document.fixed_joints,
         arms=arms,
+        balanced=document.balanced,
     )
+
+
+def _tell_defaults(document: RobotDocument, description: Description) -> None:
+    """Say which limits nobody has stated, and what counts instead."""
+    if document.acceleration is None:
+        default = f"{_ACCELERATION} per s, times the velocity limits"
+        logger.warning("%s: no acceleration is stated: %s", description.where, default)
+    joints = [joint for arm in document.arms.values() for joint in arm.joints]
+    unlimited = [joint for joint in joints if np.isinf(description.joints[joint].effort)]
+    if unlimited:
+        names = ", ".join(unlimited)
+        logger.warning("%s: no effort limits: any effort of %s", description.where, names)
 
 
 def _check(document: RobotDocument, description: Description) -> None:
@@ -83,6 +103,7 @@ def _arm(
 ) -> Arm:
     joints = [description.joints[name] for name in arm.joints]
     velocity = np.array([joint.velocity for joint in joints])
+    acceleration = (robot.acceleration or _ACCELERATION) * velocity
     tool_in_link = _tool_in_link(arm.tool, description.where, gripper)
     measures = _measures(gripper, arm, robot, description, tool_in_link)
     segments = arm.segments or measures.segments
@@ -95,7 +116,9 @@ def _arm(
         home=signs * np.array(arm.home),
         limits=np.array([joint.limits or _TWO_TURNS for joint in joints]),
         velocity_limits=velocity,
-        acceleration_limits=robot.acceleration * velocity,
+        acceleration_limits=acceleration,
+        jerk_limits=robot.jerk * acceleration,
+        effort_limits=np.array([joint.effort for joint in joints]),
         redundant=None if arm.redundant is None else arm.joints.index(arm.redundant),
         closed_form=arm.closed_form,
         mirror_of=arm.mirrors,
@@ -190,6 +213,8 @@ def _fingers(
         velocity=velocities[0] if velocities else np.inf,
         lever=_stated(stated.lever, lambda: measures.hand.lever),
         grasp_width=_stated(stated.grasp_width, lambda: measures.grasp_width),
+        force=stated.force,
+        pad=stated.pad,
         gap=gap,
     )
 

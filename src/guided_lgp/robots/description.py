@@ -33,6 +33,8 @@ class JointDescription:
     limits: tuple[float, float] | None
     """None where the joint turns without end."""
     velocity: float
+    effort: float
+    """Nm, or N where it slides; infinite where the URDF says none, or zero."""
     mimic: float
     """Factor to the joint that it follows; 1 if it follows none."""
     unit: str
@@ -217,6 +219,7 @@ class Description:
         return JointDescription(
             limits,
             float(stated.get("velocity", "inf")),
+            float(stated.get("effort", "inf")) or np.inf,
             1.0 if mimic is None else float(mimic.get("multiplier", "1")),
             "m" if joint.get("type") == "prismatic" else "rad",
         )

@@ -76,6 +76,10 @@ class FingersDocument(Document):
     """How far a fingertip moves per rad (or m) of the joints. Derived: of the fingers' shapes."""
     grasp_width: Length | None = None
     """Widest side of an object that the fingers close across. Derived: 5 mm less than the gap."""
+    force: Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)] = 40.0
+    """Largest force (N) with which they press on an object from either side."""
+    pad: Length = 0.01
+    """Mean distance of the points of a fingertip's pad from its middle."""
 
 
 class OffsetShoulderDocument(Document):
@@ -167,8 +171,12 @@ class RobotDocument(Document):
     stand: tuple[Length, Length] = (0.1, 0.1)
     """Half extents of the column under the base link, where a scene raises it."""
     fixed_joints: dict[str, FixedJoint] = Field(default_factory=dict)
-    acceleration: Length
-    """Limits of acceleration over those of velocity (1/s)."""
+    acceleration: Length | None = None
+    """Limits of acceleration over those of velocity (1/s); 2 where it is not stated."""
+    jerk: Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)] = 20.0
+    """Limits of jerk over those of acceleration (1/s)."""
+    balanced: bool = False
+    """Whether springs or counterweights carry the arms' own weight, so that motors need not."""
     arms: Annotated[dict[str, ArmDocument], Field(min_length=1)]
     """By name of the gripper, in the order of a configuration."""
 

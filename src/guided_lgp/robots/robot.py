@@ -68,6 +68,10 @@ class Fingers:
     """How far (m) a fingertip moves at most per unit of the value."""
     grasp_width: float
     """Widest side (m) of an object that they close across."""
+    force: float
+    """Largest force (N) with which they press on an object from either side."""
+    pad: float
+    """Mean distance (m) of the points of a fingertip's pad from its middle."""
     gap: Gap
 
     def opening(self, value: float) -> float:
@@ -128,6 +132,10 @@ class Arm:
     """(n,) rad/s."""
     acceleration_limits: Array
     """(n,) rad/s^2."""
+    jerk_limits: Array
+    """(n,) rad/s^3."""
+    effort_limits: Array
+    """(n,) Nm that the motors exert at most; infinite where nobody says."""
     redundant: int | None
     """Index of the joint that parametrises the inverse kinematics, if the arm has one too many."""
     closed_form: OffsetShoulderDocument | None
@@ -182,6 +190,8 @@ class Robot:
     """Joints that keep the value that the scene gives them, by their name in the scene."""
     arms: Mapping[str, Arm]
     """By gripper."""
+    balanced: bool = False
+    """Whether springs or counterweights carry the arms' own weight."""
     tilt: tuple[float, float] = (0.0, 0.0)
     """Roll and pitch (rad) of the base link where it is mounted."""
 
@@ -245,6 +255,16 @@ class Robot:
     def acceleration_limits(self) -> Array:
         """(n,) rad/s^2."""
         return np.concatenate([arm.acceleration_limits for arm in self.arms.values()])
+
+    @cached_property
+    def jerk_limits(self) -> Array:
+        """(n,) rad/s^3."""
+        return np.concatenate([arm.jerk_limits for arm in self.arms.values()])
+
+    @cached_property
+    def effort_limits(self) -> Array:
+        """(n,) Nm."""
+        return np.concatenate([arm.effort_limits for arm in self.arms.values()])
 
     @cached_property
     def continuous(self) -> tuple[int, ...]:

@@ -20,7 +20,8 @@ from guided_lgp.scene.tolerances import MARGIN
 
 _OTHER_BOX, _OTHER_TABLE = (0.25, 0.65, 0.68), (0.78, 0.66, 0.50)
 _LEGS, _FLOOR = (0.45, 0.42, 0.40), (0.93, 0.94, 0.95)
-_BOX_DENSITY = 400.0
+BOX_DENSITY = 400.0
+"""kg/m³ of every box."""
 _FRICTION = 0.8
 _SPINNING_FRICTION = 0.01  # m: faces that touch resist turning, their contact points alone do not
 
@@ -91,7 +92,7 @@ class World:
             )
         self.supports = {body.name: self._add(body) for body in scene.supports}
         self.boxes = {
-            box.name: self._add(box, _BOX_DENSITY * box.convex.volume) for box in scene.movable
+            box.name: self._add(box, BOX_DENSITY * box.convex.volume) for box in scene.movable
         }
         self._obstacles = {body.name: self._add(body) for body in scene.in_the_way}
         self._names: dict[tuple[int, int], str] = {

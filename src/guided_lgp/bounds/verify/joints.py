@@ -1,21 +1,21 @@
 """Limits of joints along a motion, and fingers that hold what they carry."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from guided_lgp.bounds.checks import Violation, box_sizes, closing_axis
 from guided_lgp.bounds.results import Array, Attachment
-from guided_lgp.bounds.verify.attachments import carriers, spans
+from guided_lgp.bounds.verify.attachments import spans
+from guided_lgp.bounds.verify.efforts import carried_boxes, derivatives, joint_efforts
 from guided_lgp.bounds.verify.keyframes import LIMIT_TOLERANCE
 from guided_lgp.logic import Skeleton
-from guided_lgp.poses import compose, inverse
+from guided_lgp.poses import IDENTITY, inverse
 from guided_lgp.robots import Arm, Robot
 from guided_lgp.scene import Scene
-from guided_lgp.scene.world import initial_poses
 
 RATE_TOLERANCE = 1.02
-"""Factor on velocity and acceleration limits, for finite differences."""
+"""Factor on all limits but those of positions, for finite differences."""
 JUMP = 3.0
 """A joint that is faster than this multiple of its limit jumps."""
 SPREAD = 1e-3
@@ -26,8 +26,55 @@ AT_REST = 1e-3
 """How far (rad) the joints of an arm move at most while its fingers open or close."""
 
 
-def rate_faults(robot: Robot, q: Array, times: Array) -> Violation | None:
-    """Position, velocity and acceleration limits of the samples (T, m) of all moving joints."""
+def limit_faults(
+    scene: Scene, skeleton: Skeleton, switches: Sequence[int], q: Array, times: Array
+) -> Violation | None:
+    """Limits of position, velocity, acceleration and effort.
+
+    Args:
+        scene: gives the robot and the loads.
+        skeleton: the actions.
+        switches: row of each action's switch.
+        q: samples (T, m) of all moving joints.
+        times: (T,) s.
+    """
+    robot = scene.robot.description
+    excesses = _rate_excesses(robot, q, times)
+    fault = _first_fault(robot, excesses, times)
+    if fault is not None:
+        return fault
+    return _first_fault(
+        robot, {"effort": _effort_excess(scene, skeleton, switches, q, times)}, times
+    )
+
+
+def rows_outside_limits(
+    scene: Scene, skeleton: Skeleton, switches: Sequence[int], q: Array, times: Array
+) -> dict[str, int]:
+    """How many rows are outside each kind of limit, from positions to jerk.
+
+    The arguments are those of :func:`limit_faults`.
+    """
+    robot = scene.robot.description
+    excesses = _rate_excesses(robot, q, times)
+    excesses["jerk"] = _jerk_excess(robot, q, times)
+    excesses["effort"] = _effort_excess(scene, skeleton, switches, q, times)
+    del excesses["jump"]  # these are too fast, too
+    return {kind: int((excess > 0).any(axis=1).sum()) for kind, excess in excesses.items()}
+
+
+def _first_fault(robot: Robot, excesses: Mapping[str, Array], times: Array) -> Violation | None:
+    for kind, excess in excesses.items():
+        if excess.size and excess.max() > 0:
+            row = int(np.argmax(excess.max(axis=1) > 0))
+            joint = int(np.argmax(excess[row]))
+            constraint = f"{kind} {robot.moving_joints[joint]}"
+            return Violation(constraint, float(excess[row, joint]), time=float(times[row]))
+    return None
+
+
+def _rate_excesses(robot: Robot, q: Array, times: Array) -> dict[str, Array]:
+    """By how much rows (·, joints) exceed limits, in rad or units of the limit."""
     fingers = [arm.fingers for arm in robot.arms.values()]
     ranges = [np.sort(np.outer(hand.ratios, (hand.lower, hand.upper)), axis=1) for hand in fingers]
     lower, upper = np.concatenate([robot.position_limits, *ranges]).T
@@ -37,19 +84,30 @@ def rate_faults(robot: Robot, q: Array, times: Array) -> Violation | None:
     velocity = np.diff(q, axis=0) / steps[:, None]
     speed = np.abs(velocity) / limits
     rate = np.abs(np.diff(velocity, axis=0)) / ((steps[1:] + steps[:-1]) / 2)[:, None]
-    effort = rate[:, : len(robot.joint_names)] / robot.acceleration_limits
-    for kind, excess in (
-        ("joint limit", np.maximum(lower - q, q - upper) - LIMIT_TOLERANCE),
-        ("jump", speed - JUMP),
-        ("velocity", speed - RATE_TOLERANCE),
-        ("acceleration", effort - RATE_TOLERANCE),
-    ):
-        if excess.size and excess.max() > 0:
-            row = int(np.argmax(excess.max(axis=1) > 0))
-            joint = int(np.argmax(excess[row]))
-            constraint = f"{kind} {robot.moving_joints[joint]}"
-            return Violation(constraint, float(excess[row, joint]), time=float(times[row]))
-    return None
+    change = rate[:, : len(robot.joint_names)] / robot.acceleration_limits
+    return {
+        "joint limit": np.maximum(lower - q, q - upper) - LIMIT_TOLERANCE,
+        "jump": speed - JUMP,
+        "velocity": speed - RATE_TOLERANCE,
+        "acceleration": change - RATE_TOLERANCE,
+    }
+
+
+def _jerk_excess(robot: Robot, q: Array, times: Array) -> Array:
+    """Of the arms' joints (T - 3, n), in units of the limit."""
+    _, changes = derivatives(q[:, : len(robot.joint_names)], times)
+    jerks = np.abs(np.diff(changes, axis=0)) / np.diff(times)[1:-1, None]
+    return np.asarray(jerks / robot.jerk_limits - RATE_TOLERANCE)
+
+
+def _effort_excess(
+    scene: Scene, skeleton: Skeleton, switches: Sequence[int], q: Array, times: Array
+) -> Array:
+    """Of the arms' joints (T - 2, n), in units of the limit."""
+    robot = scene.robot.description
+    carried = carried_boxes(scene, skeleton, switches, q)
+    efforts = joint_efforts(scene, q[:, : len(robot.joint_names)], times, carried)
+    return np.abs(efforts) / robot.effort_limits - RATE_TOLERANCE
 
 
 def finger_faults(
@@ -80,15 +138,13 @@ def _widths(
     scene: Scene, skeleton: Skeleton, switches: Sequence[int], q: Array
 ) -> dict[Attachment, float]:
     """Width (m) of what each gripper closes on, for every span in which it carries a box."""
-    sizes, boxes, widths = box_sizes(scene), initial_poses(scene), {}
-    arms = q[:, : len(scene.robot.description.joint_names)]
-    carried = spans(scene.state, skeleton, switches, len(q), carriers)
-    for span in sorted(carried, key=lambda span: span.start):
-        start, end = scene.robot.tool_poses(arms[[span.start, span.end]])[span.gripper]
-        across = closing_axis(boxes[span.box].tolist(), start.tolist())
-        widths[span] = sizes[span.box][across]
-        boxes[span.box] = compose(end, compose(inverse(start), boxes[span.box]))
-    return widths
+    sizes = box_sizes(scene)
+    return {
+        load.span: sizes[load.span.box][
+            closing_axis(IDENTITY.tolist(), inverse(load.grip).tolist())
+        ]
+        for load in carried_boxes(scene, skeleton, switches, q)
+    }
 
 
 def _play(arm: Arm, width: float, q: Array, fingers: Array) -> Array:

@@ -11,7 +11,7 @@ from guided_lgp.bounds.goals import NO_TERMS, GoalTerms
 from guided_lgp.bounds.results import Array, Trajectory
 from guided_lgp.bounds.verify.attachments import switches_of
 from guided_lgp.bounds.verify.geometry import declared, grasp_faults, placement_faults
-from guided_lgp.bounds.verify.joints import finger_faults, rate_faults
+from guided_lgp.bounds.verify.joints import finger_faults, limit_faults
 from guided_lgp.bounds.verify.phase import Phase
 from guided_lgp.logic import Skeleton, State, successor
 from guided_lgp.scene.tolerances import MARGIN
@@ -41,10 +41,10 @@ def verify_path(
     """Check a whole motion.
 
     The motion starts with arms and boxes where the scene has them. It stays within the limits of
-    position, velocity and acceleration; grasps and places happen in the skeleton's order, each with
-    the gripper really at the box and the box properly on its support; boxes move only with a
-    gripper; nothing collides on the way, looked at in steps of at most 1 cm of the fastest point
-    (see :class:`_Collisions`); and at the end every box is where the skeleton leaves it.
+    position, velocity, acceleration and effort; grasps and places happen in the skeleton's order,
+    each with the gripper really at the box and the box properly on its support; boxes move only
+    with a gripper; nothing collides on the way, looked at in steps of at most 1 cm of the fastest
+    point (see :class:`_Collisions`); and at the end every box is where the skeleton leaves it.
 
     Args:
         world: of the scene.
@@ -58,9 +58,8 @@ def verify_path(
     robot = world.scene.robot.description
     columns = [trajectory.joint_names.index(name) for name in robot.moving_joints]
     q = trajectory.q[:, columns]
-    fault = rate_faults(robot, q, trajectory.times) or finger_faults(
-        world.scene, skeleton, switches, q, trajectory.times
-    )
+    motion = (world.scene, skeleton, switches, q, trajectory.times)
+    fault = limit_faults(*motion) or finger_faults(*motion)
     away = float(np.abs(q[0, : len(robot.joint_names)] - world.scene.robot.start).max())
     if fault is None and away > START:
         fault = Violation("start", away, 0, 0.0)

@@ -1,0 +1,134 @@
+"""Torques that the arms' motors exert along a motion, by inverse dynamics."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from guided_lgp.bounds.checks import volumes
+from guided_lgp.bounds.results import Array, Attachment
+from guided_lgp.bounds.verify.attachments import carriers, spans
+from guided_lgp.logic import Skeleton
+from guided_lgp.poses import compose, inverse, rotation_matrix
+from guided_lgp.scene import Scene
+from guided_lgp.scene.world import BOX_DENSITY, initial_poses
+
+GRAVITY = 9.81
+"""m/s²."""
+
+
+@dataclass(frozen=True)
+class Carried:
+    """A box that is rigid in a gripper's tool frame for some rows."""
+
+    span: Attachment
+    grip: Array
+    """Its pose (7,) in the tool frame."""
+
+
+def carried_boxes(
+    scene: Scene, skeleton: Skeleton, switches: Sequence[int], q: Array
+) -> list[Carried]:
+    """Every box that moves with a gripper, and how: from the scene, the switches and kinematics.
+
+    Args:
+        scene: the initial configuration.
+        skeleton: the actions.
+        switches: row of each action's switch.
+        q: (T, m) the arms' joints, and others after them.
+    """
+    boxes, found = initial_poses(scene), []
+    arms = q[:, : len(scene.robot.description.joint_names)]
+    held = spans(scene.state, skeleton, switches, len(q), carriers)
+    for span in sorted(held, key=lambda span: span.start):
+        start, end = scene.robot.tool_poses(arms[[span.start, span.end]])[span.gripper]
+        grip = compose(inverse(start), boxes[span.box])
+        found.append(Carried(span, grip))
+        boxes[span.box] = compose(end, grip)
+    return found
+
+
+def joint_efforts(scene: Scene, q: Array, times: Array, carried: Iterable[Carried]) -> Array:
+    """Torques (T - 2, n) in Nm at all rows but the first and the last.
+
+    What springs carry is left out (``Robot.balanced``). Loads are points at the boxes' centres:
+    their weight and what accelerates them.
+
+    Args:
+        scene: gives the robot, where it stands, and the boxes' masses.
+        q: (T, n) the arms' joints (rad).
+        times: (T,) s.
+        carried: the loads.
+    """
+    if len(q) < 3:
+        return np.zeros((0, q.shape[1]))
+    rates, changes = derivatives(q, times)
+    efforts = np.array([_torques(scene, *row) for row in zip(q[1:-1], rates, changes, strict=True)])
+    for load in carried:
+        rows = slice(max(load.span.start, 1), min(load.span.end, len(q) - 2) + 1)
+        if rows.stop - rows.start > 0:
+            efforts[rows.start - 1 : rows.stop - 1] += _load_torques(scene, q, times, load, rows)
+    return efforts
+
+
+def derivatives(values: Array, times: Array) -> tuple[Array, Array]:
+    """First and second derivatives (T - 2, n) at the inner rows of samples (T, n)."""
+    steps = np.diff(times)[:, None]
+    rates = np.diff(values, axis=0) / steps
+    return (rates[1:] + rates[:-1]) / 2, np.diff(rates, axis=0) / ((steps[1:] + steps[:-1]) / 2)
+
+
+def _torques(scene: Scene, q: Array, rate: Array, change: Array) -> Array:
+    """Of the arms alone (n,)."""
+    import pinocchio
+
+    robot = scene.robot.description
+    model, data = _model(scene)
+    columns = [joint.velocity for joint in robot.kinematics.joints]
+    full = robot.kinematics.rows(q[None], scene.robot.fixed_values)[0]
+    velocity, acceleration = np.zeros((2, model.nv))
+    velocity[columns], acceleration[columns] = rate, change
+    torques = pinocchio.rnea(model, data, full, velocity, acceleration)[columns]
+    if robot.balanced:
+        torques = torques - pinocchio.computeGeneralizedGravity(model, data, full)[columns]
+    return np.asarray(torques)
+
+
+def _load_torques(scene: Scene, q: Array, times: Array, load: Carried, rows: slice) -> Array:
+    """Of one box, at some rows: (R, n)."""
+    import pinocchio
+
+    robot, base = scene.robot.description, rotation_matrix(scene.robot.base_pose[3:])
+    arm, kinematics = robot.arms[load.span.gripper], robot.kinematics
+    tools = scene.robot.tool_poses(q)[load.span.gripper]
+    centres = compose(tools, load.grip)[:, :3]
+    _, changes = derivatives(centres, times)
+    mass = BOX_DENSITY * volumes(scene)[load.span.box]
+    pull = np.array([0.0, 0.0, GRAVITY])
+    forces = mass * (changes[rows.start - 1 : rows.stop - 1] + pull) @ base
+    model, data = _model(scene)
+    columns = [joint.velocity for joint in kinematics.joints]
+    frame = model.getFrameId(arm.tool_link)
+    point = compose(arm.tool_in_link, load.grip)[:3]
+    found = []
+    full = kinematics.rows(q[rows], scene.robot.fixed_values)
+    for configuration, force in zip(full, forces, strict=True):
+        jacobian = pinocchio.computeFrameJacobian(
+            model, data, configuration, frame, pinocchio.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        )
+        turned = data.oMf[frame].rotation @ point
+        found.append((jacobian[:3].T @ force + jacobian[3:].T @ np.cross(turned, force))[columns])
+    return np.array(found)
+
+
+@lru_cache(maxsize=2)
+def _model(scene: Scene) -> tuple[Any, Any]:
+    """Pinocchio's model under the gravity of the mounted robot, and its data."""
+    import pinocchio
+
+    model = pinocchio.Model(scene.robot.description.kinematics.model)
+    down = np.array([0.0, 0.0, -GRAVITY]) @ rotation_matrix(scene.robot.base_pose[3:])
+    model.gravity = pinocchio.Motion(down, np.zeros(3))
+    return model, model.createData()
