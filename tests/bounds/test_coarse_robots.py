@@ -45,7 +45,7 @@ def test_segments_share_the_redundant_joint_only(robot: str, shared: int | None)
     formulation = Formulator(SceneGeometry(scene), Margins()).build(
         parse_skeleton(f"(grasp {hand} red)")
     )
-    (contact,) = formulation.grips[0].configurations
+    (contact,) = formulation.configurations[formulation.grips[0]]
     assert len(contact.segments) == 2
     for segment in contact.segments:
         same = np.flatnonzero(np.equal(contact.joints, segment.joints)).tolist()

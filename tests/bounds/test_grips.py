@@ -88,19 +88,19 @@ def test_a_box_with_one_pair_of_sides_leaves_nothing_to_choose() -> None:
     generator = np.random.default_rng(0)
     before = generator.bit_generator.state
     found = {variants(box(0.15, 0.07, 0.10)).of(n, generator, Variant()) for n in range(9)}
-    assert found == {Variant((0,), (0, 0))}
+    assert found == {Variant((0, 0), (0, 0))}
     assert generator.bit_generator.state == before  # so that other choices stay what they were
 
 
 def test_starts_try_both_pairs_of_sides_the_narrower_first() -> None:
     found = starts(variants(box(0.05, 0.04, 0.07)), Variant())
-    assert found[0].sides == (0,)
-    assert {one.sides for one in found[1::2]} == {(0,), (1,)}
+    assert found[0].sides == (0, 0)
+    assert {one.sides for one in found[1::2]} == {(0, 0), (1, 0)}
 
 
 def test_what_is_kept_of_a_prefix_stays_in_every_other_start() -> None:
     found = starts(variants(box(0.05, 0.04, 0.07), lid=0.9), Variant((1,), (0,)))
-    assert all(one.sides == (1,) and one.low[0] == 0 for one in found[1::2])
+    assert all(one.sides == (1, 0) and one.low[0] == 0 for one in found[1::2])
     assert {one.low[1] for one in found[1::2]} == {0, 1}
 
 

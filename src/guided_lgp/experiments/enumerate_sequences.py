@@ -10,7 +10,7 @@ has ended. A shard whose files are not those that were written is computed again
 import json
 import logging
 import os
-from collections.abc import Set
+from collections.abc import Iterable, Iterator, Set
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
@@ -135,7 +135,7 @@ def _digests(shard: Path) -> str:
 
 def verdict_table(scene: Scene, found: Enumeration) -> pa.Table:
     """One row per verdict of the coarse bound."""
-    rows = []
+    rows, states = [], _states(scene, found.verdicts)
     for verdict in found.verdicts:
         failure = verdict.failure
         known = failure is not None and np.isfinite(failure.violation)
@@ -148,7 +148,7 @@ def verdict_table(scene: Scene, found: Enumeration) -> pa.Table:
                 "failure_action": failure.action if failure else None,
                 "failure_constraint": failure.constraint if failure else None,
                 "failure_violation": failure.violation if failure and known else None,
-                "states": _states(scene, verdict) if verdict.feasible else None,
+                "states": next(states) if verdict.feasible else None,
             }
         )
     return pa.Table.from_pylist(rows, schema=VERDICTS)
@@ -168,11 +168,15 @@ def shortest_table(scene: Scene, found: Enumeration) -> pa.Table:
     return pa.Table.from_pylist(rows, schema=SHORTEST)
 
 
-def _states(scene: Scene, verdict: CoarseResult) -> list[float]:
-    keyframes = (start(scene), *verdict.after_action)
-    positions = [list(state.values()) for state in observe_all(scene, keyframes)]
-    flat: list[float] = np.array(positions).ravel().tolist()
-    return flat
+def _states(scene: Scene, verdicts: Iterable[CoarseResult]) -> Iterator[list[float]]:
+    """What is where at the start of each feasible sequence and after each of its actions."""
+    feasible = [verdict for verdict in verdicts if verdict.feasible]
+    first = start(scene)
+    keyframes = [k for verdict in feasible for k in (first, *verdict.after_action)]
+    seen = iter(observe_all(scene, keyframes) if keyframes else ())
+    for verdict in feasible:
+        positions = [list(next(seen).values()) for _ in range(1 + len(verdict.skeleton))]
+        yield np.array(positions).ravel().tolist()
 
 
 def source_digest() -> str:

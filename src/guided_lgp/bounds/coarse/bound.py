@@ -9,13 +9,14 @@ import numpy as np
 
 from guided_lgp.bounds.coarse.decoding import Decoder
 from guided_lgp.bounds.coarse.facts import Facts
-from guided_lgp.bounds.coarse.formulation import Formulation, Formulator
+from guided_lgp.bounds.coarse.formulation import Formulation
+from guided_lgp.bounds.coarse.programs import Formulators, Programs
 from guided_lgp.bounds.coarse.solver import Settings, Solution, Solver, default_solver
 from guided_lgp.bounds.coarse.starts import Starts
-from guided_lgp.bounds.coarse.variants import Variant, Variants
+from guided_lgp.bounds.coarse.variants import Variant
 from guided_lgp.bounds.deadline import NEVER, Deadline
 from guided_lgp.bounds.goals import NO_TERMS, GoalTerms
-from guided_lgp.bounds.program.geometry import Margins, SceneGeometry
+from guided_lgp.bounds.program.geometry import SceneGeometry
 from guided_lgp.bounds.results import Array, CoarseResult, Failure
 from guided_lgp.bounds.terms.term import UngraspableError
 from guided_lgp.bounds.verify import verify_keyframes
@@ -69,6 +70,7 @@ class CoarseBound:
         self._solver = solver or default_solver(scene.robot.description)
         self._geometry = SceneGeometry(scene)
         self.facts = facts or Facts(self._geometry)
+        self._formulators = Formulators(self._geometry, goals)
         self._starts = Starts(self._geometry, self._solver)
         self._decoder = Decoder(self._geometry)
         self._settings = Settings()
@@ -103,13 +105,13 @@ class CoarseBound:
         if not result.feasible or not self._goals.final:
             return result
         started = time.perf_counter()
-        programs = _Programs(self._geometry, result.skeleton, self._goals)
+        programs = self._programs(result.skeleton, self._goals)
         found = self._first_feasible(programs, None)
         return replace(found, time_s=time.perf_counter() - started)
 
     def solutions(self, skeleton: Skeleton, count: int) -> Iterator[CoarseResult]:
         """Up to ``count`` further verified solutions, with the goals, from independent starts."""
-        programs = _Programs(self._geometry, skeleton, self._goals)
+        programs = self._programs(skeleton, self._goals)
         found = 0
         for number in range(self._restarts, self._restarts + 3 * count):
             try:
@@ -122,14 +124,15 @@ class CoarseBound:
             if found == count:
                 return
 
+    def _programs(self, skeleton: Skeleton, goals: GoalTerms) -> Programs:
+        return Programs(self._formulators, self._geometry, skeleton, goals)
+
     def _search(self, skeleton: Skeleton, prefix: CoarseSolution | None) -> CoarseSolution:
         """The verdict on a skeleton, whose prefix is feasible, without the goals' places."""
         early = replace(self._goals, final=())
-        return self._first_feasible(_Programs(self._geometry, skeleton, early), prefix)
+        return self._first_feasible(self._programs(skeleton, early), prefix)
 
-    def _first_feasible(
-        self, programs: "_Programs", prefix: CoarseSolution | None
-    ) -> CoarseSolution:
+    def _first_feasible(self, programs: Programs, prefix: CoarseSolution | None) -> CoarseSolution:
         """Start after start until one leads to a verified solution, unless a fact forbids it.
 
         A fact that has to be proved first is worth its time when the first start has failed.
@@ -157,7 +160,7 @@ class CoarseBound:
         return CoarseSolution(skeleton, feasible=False, failure=failure, restarts=self._restarts)
 
     def _restart(
-        self, programs: "_Programs", number: int, prefix: CoarseSolution | None
+        self, programs: Programs, number: int, prefix: CoarseSolution | None
     ) -> CoarseSolution:
         """One start: the first and every other one keep the solution of the prefix."""
         self._deadline.check()
@@ -182,7 +185,7 @@ class CoarseBound:
 
     def _check(
         self,
-        programs: "_Programs",
+        programs: Programs,
         formulation: Formulation,
         solution: Solution,
         restarts: int,
@@ -212,35 +215,6 @@ class CoarseBound:
             restarts=restarts,
             values=solution.values[: formulation.program.variables],
         )
-
-
-_MARGINS = (
-    Margins(),
-    Margins(clear=0.0, apart=0.0, beside=0.003),
-    Margins(clear=-0.004, apart=-0.01, beside=0.003),
-)
-"""Comfortable ones, close ones, and such that only the verification limits: starts take turns."""
-
-
-class _Programs:
-    """The programs of a skeleton, by margins and variant, built when a start needs them."""
-
-    def __init__(self, geometry: SceneGeometry, skeleton: Skeleton, goals: GoalTerms) -> None:
-        self.skeleton = skeleton
-        self.goals = goals
-        self._geometry = geometry
-        self.variants = Variants(geometry, skeleton)
-        self._built: dict[tuple[int, Variant], Formulation] = {}
-
-    def built(self, number: int, variant: Variant) -> Formulation:
-        """The program that a start solves."""
-        margins = number % len(_MARGINS)
-        if (margins, variant) not in self._built:
-            formulator = Formulator(
-                self._geometry, _MARGINS[margins], self.goals.lasting, self.goals.final, variant
-            )
-            self._built[margins, variant] = formulator.build(self.skeleton)
-        return self._built[margins, variant]
 
 
 _PROVED = "proved for the arm alone, collisions left out"

@@ -8,6 +8,7 @@ others.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 from inspect import signature
 
@@ -26,7 +27,7 @@ from guided_lgp.bounds.terms.clear import keep_clear
 from guided_lgp.bounds.terms.hold import take_over
 from guided_lgp.bounds.terms.term import GoalTerm
 from guided_lgp.errors import InputError
-from guided_lgp.logic import Domain, GroundInstruction, GroundTerm, Skeleton, successor
+from guided_lgp.logic import Action, Domain, GroundInstruction, GroundTerm, Skeleton, successor
 from guided_lgp.logic.declarations import Number, Term
 
 
@@ -38,6 +39,8 @@ class Formulation:
     constants: Array
     instances: tuple[Instance, ...]
     grips: tuple[HeldBox, ...]
+    configurations: Mapping[HeldBox, tuple[ArmConfiguration, ...]]
+    """Of each grip."""
     choices: tuple[Start, ...]
     """What starts choose, in order; then they choose the grips."""
     at_switch: tuple[KeyframeSlots, ...]
@@ -45,15 +48,10 @@ class Formulation:
 
 
 class Formulator:
-    """Builds the program of one skeleton."""
+    """The program of a skeleton while it is walked, action by action."""
 
     def __init__(
-        self,
-        geometry: SceneGeometry,
-        margins: Margins,
-        lasting: Iterable[GroundTerm] = (),
-        final: Sequence[GroundTerm] = (),
-        variant: Variant | None = None,
+        self, geometry: SceneGeometry, margins: Margins, lasting: Iterable[GroundTerm] = ()
     ) -> None:
         """Begin a program.
 
@@ -61,54 +59,85 @@ class Formulator:
             geometry: of the scene.
             margins: distances that it keeps.
             lasting: terms that hold all the time.
-            final: terms that hold at the end.
-            variant: its discrete choices; the first of each if not given.
         """
         robot = kinematics_of(geometry.scene.robot.description)
         self._domain = geometry.domain
-        self._variant = variant or Variant()
-        sides = self._variant.sides
-        self._context = Context(geometry, robot, kernel_table(robot), margins, sides)
-        self._final = final
+        self._context = Context(geometry, robot, kernel_table(robot), margins)
+        self._at_switch: tuple[KeyframeSlots, ...] = ()
+        self._after_action: tuple[KeyframeSlots, ...] = ()
         for box, gripper in geometry.scene.held.items():
             take_over(self._context, gripper, box)
         for term in lasting:
             self._add(term.name, *term.symbols, **term.options)
 
-    def build(self, skeleton: Skeleton) -> Formulation:
+    def build(
+        self, skeleton: Skeleton, variant: Variant | None = None, final: Sequence[GroundTerm] = ()
+    ) -> Formulation:
         """The program of a skeleton whose actions are applicable one after the other.
+
+        Args:
+            skeleton: from here on.
+            variant: its discrete choices; the first of each if not given.
+            final: terms that hold at the end.
 
         Raises:
             UngraspableError: no side of a box to grasp is narrow enough.
         """
+        walk, variant = self._copy(), variant or Variant()
+        last = {self._domain.bind(action).body: index for index, action in enumerate(skeleton)}
+        walk._aim(final, last)
+        for index, action in enumerate(skeleton):
+            walk._act(action, *variant.at(index))
+        for term in final:
+            walk._context.action = last.get(term.symbols[0], len(skeleton) - 1)
+            walk._add(term.name, *term.symbols, **term.options)
+        return walk.formulation()
+
+    def after(self, action: Action, side: int, low: bool) -> "Formulator":
+        """With one more action; this one stays as it is.
+
+        Args:
+            action: which is applicable.
+            side: on which of the sides that the hand can close on a new grip does.
+            low: whether the way of its box is a low one.
+
+        Raises:
+            UngraspableError: no side of a box to grasp is narrow enough.
+        """
+        longer = self._copy()
+        longer._act(action, side, low)
+        return longer
+
+    def formulation(self) -> Formulation:
+        """The program so far."""
         context = self._context
-        at_switch, after_action = [], []
-        actions = [self._domain.bind(action) for action in skeleton]
-        last = {ground.body: index for index, ground in enumerate(actions)}
-        self._aim(last)
-        for ground in actions:
-            action = ground.action
-            lines = straight_lines(ground.motion, self._variant.is_low(context.action + 1))
-            context.begin(successor(context.state, action), lines)
-            at_switch.append(self._contact(ground))
-            self._switch(ground)
-            after_action.append(context.keyframe())
-        for term in self._final:
-            context.action = last.get(term.symbols[0], context.action)
-            self._add(term.name, *term.symbols, **term.options)
         return Formulation(
             program=context.program.build(),
             constants=np.array(context.program.constants),
             instances=tuple(context.program.instances),
             grips=tuple(context.grips),
+            configurations=dict(context.configurations),
             choices=tuple(choice for choices in context.choices for choice in choices),
-            at_switch=tuple(at_switch),
-            after_action=tuple(after_action),
+            at_switch=self._at_switch,
+            after_action=self._after_action,
         )
 
-    def _aim(self, last: Mapping[str, int]) -> None:
+    def _copy(self) -> "Formulator":
+        other = copy(self)
+        other._context = self._context.copy()
+        return other
+
+    def _act(self, action: Action, side: int, low: bool) -> None:
+        """Walk one action further."""
+        context, ground = self._context, self._domain.bind(action)
+        context.begin(successor(context.state, action), straight_lines(ground.motion, low), side)
+        self._at_switch += (self._contact(ground),)
+        self._switch(ground)
+        self._after_action += (context.keyframe(),)
+
+    def _aim(self, final: Iterable[GroundTerm], last: Mapping[str, int]) -> None:
         """Let the last action on each body whose place matters aim at that place."""
-        for term in self._final:
+        for term in final:
             box, _ = term.symbols
             if box in last:
                 self._context.aims[last[box], box] = self._drawn(term)

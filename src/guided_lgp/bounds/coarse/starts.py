@@ -55,6 +55,7 @@ class Starts:
             kept,
             generator,
             noise,
+            formulation.configurations,
             self._robot,
             self._reach,
         )

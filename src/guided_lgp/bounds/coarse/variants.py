@@ -20,13 +20,18 @@ class Variant:
     """What is chosen; the first of each where nothing is said."""
 
     sides: tuple[int, ...] = ()
-    """For each grip, on which of the sides that the hand can close on."""
+    """For each action, on which of the sides that the hand can close on its new grip does."""
     low: tuple[int, ...] = ()
     """For each action, whether its box takes a low way (1) or one from above (0)."""
 
-    def is_low(self, action: int) -> bool:
-        """Whether the box of an action takes a low way."""
-        return action < len(self.low) and self.low[action] == 1
+    def until(self, action: int) -> "Variant":
+        """The choices before an action."""
+        return Variant(self.sides[:action], self.low[:action])
+
+    def at(self, action: int) -> tuple[int, bool]:
+        """The choices of an action: the side, and whether the way is low."""
+        side = self.sides[action] if action < len(self.sides) else 0
+        return side, action < len(self.low) and self.low[action] == 1
 
 
 class Variants:
@@ -34,7 +39,7 @@ class Variants:
 
     def __init__(self, geometry: SceneGeometry, skeleton: Skeleton) -> None:
         grounds = [geometry.domain.bind(action) for action in skeleton]
-        self._sides = [count for ground in grounds for count in _sides(geometry, ground)]
+        self._sides = [_sides(geometry, ground) for ground in grounds]
         self._low = list(_ways(geometry, grounds))
 
     def of(self, number: int, generator: np.random.Generator, kept: Variant) -> Variant:
@@ -58,11 +63,10 @@ def _drawn(generator: np.random.Generator, counts: Sequence[int]) -> tuple[int, 
     return tuple(int(generator.integers(count)) if count > 1 else 0 for count in counts)
 
 
-def _sides(geometry: SceneGeometry, ground: GroundInstruction) -> Iterator[int]:
-    """On how many sides the grip that an action begins can close; 1 where it is on none."""
+def _sides(geometry: SceneGeometry, ground: GroundInstruction) -> int:
+    """On how many sides the grip that an action begins can close; 1 where none is, or it is new."""
     arm = geometry.scene.robot.description.arms.get(ground.parent)
-    if arm is not None:
-        yield max(1, len(grasp_sides(geometry, ground.body, arm)))
+    return 1 if arm is None else max(1, len(grasp_sides(geometry, ground.body, arm)))
 
 
 def _ways(geometry: SceneGeometry, grounds: Sequence[GroundInstruction]) -> Iterator[int]:

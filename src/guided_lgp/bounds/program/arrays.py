@@ -1,6 +1,8 @@
 """The nonlinear program in arrays, and what builds it."""
 
+from array import array
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,17 +77,25 @@ class ProgramBuilder:
 
     def __init__(self, table: KernelTable) -> None:
         self._table = table
-        self.constants: list[float] = [0.0]
+        self.constants = array("d", [0.0])
         self.instances: list[Instance] = []
-        self._lower: list[float] = []
-        self._upper: list[float] = []
-        self._weight: list[float] = []
-        self._target: list[float] = []
-        self._shared: list[bool] = []
-        self._kernel: list[int] = []
-        self._inputs: list[int] = []
-        self._levers: list[float] = []
-        self._parameters: list[float] = []
+        self._lower = array("d")
+        self._upper = array("d")
+        self._weight = array("d")
+        self._target = array("d")
+        self._shared = array("b")
+        self._kernel = array("i")
+        self._inputs = array("i")
+        self._levers = array("d")
+        self._parameters = array("d")
+
+    def copy(self) -> "ProgramBuilder":
+        """Another that goes on from here."""
+        other = copy(self)
+        for name, collected in vars(self).items():
+            if isinstance(collected, array | list):
+                setattr(other, name, collected[:])
+        return other
 
     def constant(self, value: float) -> int:
         """The slot of a new constant."""
@@ -133,15 +143,15 @@ class ProgramBuilder:
     def build(self) -> Program:
         """The program."""
         count = len(self._lower)
-        sizes = np.array([[k.inputs, k.parameters, k.rows] for k in self._table])
-        starts = np.zeros((len(self._kernel) + 1, 3), dtype=np.intc)
-        np.cumsum(sizes[self._kernel], axis=0, out=starts[1:])
-        inputs = np.array(self._inputs, dtype=np.intc)
+        kernel = np.array(self._kernel)
+        starts = np.zeros((len(kernel) + 1, 3), dtype=np.intc)
+        np.cumsum(self._table.sizes[kernel], axis=0, out=starts[1:])
+        inputs = np.array(self._inputs)
         inputs = np.where(inputs < 0, count - 1 - inputs, inputs).astype(np.intc)
         order = np.empty(count, dtype=np.intc)
         order[np.argsort(self._shared, kind="stable")] = np.arange(count)
         return Program(
-            kernel=np.array(self._kernel, dtype=np.intc),
+            kernel=kernel,
             input_start=_column(starts, 0),
             inputs=inputs,
             levers=np.array(self._levers),

@@ -1,6 +1,7 @@
 """What is where at a point of a skeleton, in slots of a program: the mode tree with geometry."""
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -8,7 +9,7 @@ import numpy as np
 
 from guided_lgp.bounds.program.arrays import ProgramBuilder
 from guided_lgp.bounds.program.draft import Draft
-from guided_lgp.bounds.program.geometry import GraspSide, Margins, SceneGeometry
+from guided_lgp.bounds.program.geometry import Margins, SceneGeometry
 from guided_lgp.bounds.program.kernels import KernelTable
 from guided_lgp.bounds.program.kinematics import ArmKinematics, RobotKinematics
 from guided_lgp.bounds.program.slots import (
@@ -56,7 +57,6 @@ class Context:
         robot: RobotKinematics,
         table: KernelTable,
         margins: Margins,
-        sides: Sequence[int] = (),
     ) -> None:
         """Begin before the first action.
 
@@ -65,11 +65,8 @@ class Context:
             robot: its arms.
             table: the kernels.
             margins: distances to keep.
-            sides: on which of the sides that it can close on each grip does, in order; else the
-                first.
         """
         self.geometry = geometry
-        self._sides = sides
         self.robot = robot
         self.margins = margins
         self.program = ProgramBuilder(table)
@@ -93,6 +90,8 @@ class Context:
         }
         self.grips: list[HeldBox] = []
         """All, in the order in which they begin."""
+        self.configurations: dict[HeldBox, tuple[ArmConfiguration, ...]] = {}
+        """Of each grip, in the order of the actions."""
         self.choices: list[list[Start]] = []
         """What each action leaves to the start, in the order of the terms."""
         self.balanced: set[tuple[object, ...]] = set()
@@ -102,6 +101,8 @@ class Context:
         self.aims: dict[tuple[int, str], Aim] = {}
         """Where goals want the boxes that actions put down for good, by action and box."""
         self.action = -1
+        self.side = 0
+        """Of the pairs of sides that a grip which the action begins can close on, which one."""
         self.state: State = geometry.scene.state
         """Before the action."""
         self.after: State = self.state
@@ -113,10 +114,18 @@ class Context:
         self.added: list[ArmConfiguration] = []
         """Configurations whose surroundings have no rows yet."""
 
-    def begin(self, after: State, lines: tuple[Line, ...]) -> None:
+    def copy(self) -> "Context":
+        """Another that goes on from here, after the same actions."""
+        other = copy(self)
+        other.program = self.program.copy()
+        for name in _GROWING:
+            setattr(other, name, getattr(self, name).copy())
+        return other
+
+    def begin(self, after: State, lines: tuple[Line, ...], side: int) -> None:
         """Turn to the next action."""
         self.action += 1
-        self.after, self.lines = after, lines
+        self.after, self.lines, self.side = after, lines, side
         self.before = dict(self.pose)
         self.choices.append([])
 
@@ -172,11 +181,6 @@ class Context:
     def half(self, name: str) -> tuple[float, float, float]:
         """Half extents (m) of a body."""
         return self.geometry.bodies[name].half
-
-    def next_side(self, sides: Sequence[GraspSide]) -> GraspSide:
-        """Of the sides on which fingers can close, the one of the next grip."""
-        number = len(self.grips)
-        return sides[self._sides[number] if number < len(self._sides) else 0]
 
     def closed(self, gripper: str) -> float:
         """How far (m) each finger of a hand is from where it is when the hand is wide open."""
@@ -237,3 +241,10 @@ class Context:
         x, y, yaw, z = pose
         constant = self.program.constant
         return PlanarPose(constant(x), constant(y), constant(yaw), ZERO, z)
+
+
+_GROWING = (
+    *("pose", "held", "hands", "standing", "acting", "added", "grips", "configurations", "choices"),
+    *("balanced", "separated", "aims"),
+)
+"""What a context changes in place."""

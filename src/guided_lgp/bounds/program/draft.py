@@ -1,12 +1,12 @@
 """A start in the making: values that are kept from before, and values that terms choose."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from guided_lgp.bounds.program.inverse import Reach
 from guided_lgp.bounds.program.kinematics import RobotKinematics
-from guided_lgp.bounds.program.slots import PlanarPose
+from guided_lgp.bounds.program.slots import ArmConfiguration, HeldBox, PlanarPose
 from guided_lgp.bounds.results import Array
 
 
@@ -21,6 +21,7 @@ class Draft:
         kept: int,
         generator: np.random.Generator,
         noise: float,
+        configurations: Mapping[HeldBox, Sequence[ArmConfiguration]],
         robot: RobotKinematics,
         reach: Mapping[str, Reach],
     ) -> None:
@@ -33,6 +34,7 @@ class Draft:
             kept: how many values, the first ones, are known and stay.
             generator: for placements and choices.
             noise: how far from the best candidates a choice may be (0: the best ones).
+            configurations: of each grip.
             robot: whose arms these are.
             reach: inverse kinematics of its arms, by gripper.
         """
@@ -41,6 +43,7 @@ class Draft:
         self.kept = kept
         self.generator = generator
         self.noise = noise
+        self.configurations = configurations
         self.robot = robot
         self.reach = reach
         self._variables = variables

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
+import numpy as np
 
 SCALE = 5.0
 """Weight of a residual in m against one in rad."""
@@ -99,6 +100,8 @@ class KernelTable:
         self.kernels = tuple(kernels)
         self.number = {kernel.name: index for index, kernel in enumerate(self.kernels)}
         """By the kernel's name."""
+        self.sizes = np.array([[k.inputs, k.parameters, k.rows] for k in self.kernels])
+        """(kernels, 3) numbers of inputs, parameters and rows."""
 
     def __getitem__(self, number: int) -> Kernel:
         return self.kernels[number]

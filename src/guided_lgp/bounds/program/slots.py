@@ -3,7 +3,7 @@
 Slots of constants are negative until the number of variables is known.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 from guided_lgp.bounds.program.geometry import GraspSide
 
@@ -58,7 +58,7 @@ class ArmConfiguration:
     segments: tuple[StraightSegment, ...] = ()
 
 
-@dataclass(eq=False)
+@dataclass(frozen=True, eq=False)
 class HeldBox:
     """A box in a gripper, from its grasp to the end of it: one way in which the hand holds it."""
 
@@ -74,7 +74,6 @@ class HeldBox:
     """How far (m) each finger is from wide open while the hand comes and leaves."""
     given: tuple[float, float, float] | None = None
     """Pitch, offset and depth of a grasp that the scene gives, or begins with."""
-    configurations: list[ArmConfiguration] = field(default_factory=list)
 
     @property
     def grip(self) -> tuple[int, int, int]:

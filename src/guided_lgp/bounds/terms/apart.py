@@ -1,12 +1,13 @@
 """``apart(gripper, gripper)``: the spheres of two arms keep their distance."""
 
+from functools import cache
 from itertools import permutations, product
 
 import casadi as ca
 
 from guided_lgp.bounds.program.context import Context
 from guided_lgp.bounds.program.kernels import SCALE, Kernel, distance, kernel
-from guided_lgp.bounds.program.kinematics import Chain, RobotKinematics, levers
+from guided_lgp.bounds.program.kinematics import ArmKinematics, Chain, RobotKinematics, levers
 from guided_lgp.bounds.terms.term import Term
 
 
@@ -40,7 +41,6 @@ def keep_apart(
 ) -> None:
     """Of one configuration of each arm."""
     one, two = context.robot.arms[gripper], context.robot.arms[other]
-    count = len(two.chain.against_arms)
     context.rows(
         f"apart_{one.chain.name}_{two.chain.name}",
         (*joints, *others_joints),
@@ -51,9 +51,16 @@ def keep_apart(
             *context.fixed,
         ),
         ("apart", gripper, other),
-        tuple(one.links[i] for i in one.chain.against_arms for _ in range(count)),
+        _links(one, two),
         (*levers(one.chain, context.closed(gripper)), *levers(two.chain, context.closed(other))),
     )
+
+
+@cache
+def _links(one: ArmKinematics, two: ArmKinematics) -> tuple[str, ...]:
+    """Of the first arm, for each pair of spheres."""
+    count = len(two.chain.against_arms)
+    return tuple(one.links[i] for i in one.chain.against_arms for _ in range(count))
 
 
 def _add(context: Context, gripper: str, other: str) -> None:

@@ -97,7 +97,7 @@ def _new_grip(context: Context, gripper: str, box: str) -> HeldBox:
     if not sides:
         narrowest = min(context.geometry.movable[box].grasp_widths)
         raise UngraspableError(context.action, box, narrowest - arm.fingers.grasp_width)
-    side = context.next_side(sides)
+    side = sides[context.side]
     if side.given is not None:
         return _given_grip(context, gripper, box, side, side.given)
     height = context.half(box)[2]
@@ -154,7 +154,7 @@ def configuration(
         _rows(context, held, end, pose, line.back, line.up)
         segments.append(StraightSegment(end, line.back, line.up))
     added = ArmConfiguration(held, context.action, joints, pose, tuple(segments))
-    held.configurations.append(added)
+    context.configurations[held] = (*context.configurations.get(held, ()), added)
     context.added.append(added)
     return added
 
@@ -197,19 +197,20 @@ def _rows(
 
 def start(draft: Draft, held: HeldBox) -> None:
     """Choose one pitch for a mode and the joints of its configurations."""
-    if all(configuration.joints[0] < draft.kept for configuration in held.configurations):
+    configurations = draft.configurations[held]
+    if all(configuration.joints[0] < draft.kept for configuration in configurations):
         return
-    places = [draft.pose(configuration.pose) for configuration in held.configurations]
+    places = [draft.pose(configuration.pose) for configuration in configurations]
     tried = pitches(draft, held)
     if held.given is None and held.pitch >= draft.kept:
         tried = tried + draft.noise * draft.generator.uniform(-_PITCH_SPREAD, _PITCH_SPREAD)
         costs = sum(
             least_costs(draft, held, place[None], configuration.segments, tried)[0]
-            for configuration, place in zip(held.configurations, places, strict=True)
+            for configuration, place in zip(configurations, places, strict=True)
         )
         tried = tried[[draft.choose(np.asarray(costs))]]
         draft.values[held.pitch] = tried[0]
-    for configuration, place in zip(held.configurations, places, strict=True):
+    for configuration, place in zip(configurations, places, strict=True):
         if configuration.joints[0] >= draft.kept:
             joints, costs = _solutions(draft, held, place[None], configuration.segments, tried)
             chosen = draft.choose(costs[0, 0])

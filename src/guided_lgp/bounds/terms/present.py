@@ -42,7 +42,7 @@ class Offer:
         candidates[:, 2] = draft.generator.uniform(-np.pi / 2, np.pi / 2, _CANDIDATES)
         lowest = draft.lower[pose.z]
         candidates[:, 3] = lowest + draft.generator.uniform(0.0, 0.1, _CANDIDATES)
-        first, tried = held.configurations[0], pitches(draft, held)
+        first, tried = draft.configurations[held][0], pitches(draft, held)
         grasp = least_costs(draft, held, draft.pose(first.pose)[None], first.segments, tried)
         offer = least_costs(draft, held, candidates, self.configuration.segments, tried)
         best = draft.choose((grasp + offer).min(axis=1))

@@ -46,10 +46,10 @@ class Placement:
             return
         candidates = self._draw(draft)
         overlaps = self._overlaps(draft, candidates)
-        first, tried = self.held.configurations[0], pitches(draft, self.held)
+        first, tried = draft.configurations[self.held][0], pitches(draft, self.held)
         origin = draft.pose(first.pose)
         grasp = least_costs(draft, self.held, origin[None], first.segments, tried)
-        place = least_costs(draft, self.held, candidates, self._segments(), tried)
+        place = least_costs(draft, self.held, candidates, self._segments(draft), tried)
         best = draft.choose((grasp + place).min(axis=1) + overlaps)
         for slot, value in zip(self.pose.plane, candidates[best], strict=False):
             draft.values[slot] = value
@@ -80,9 +80,9 @@ class Placement:
                 total += np.array([other.overlap(draft, candidate) for candidate in candidates])
         return _OVERLAP * total
 
-    def _segments(self) -> tuple[StraightSegment, ...]:
+    def _segments(self, draft: Draft) -> tuple[StraightSegment, ...]:
         """The straight segments of the arm that puts the box down."""
-        configurations = reversed(self.held.configurations)
+        configurations = reversed(draft.configurations[self.held])
         return next(c.segments for c in configurations if c.action == self.action)
 
 
