@@ -89,7 +89,7 @@ verify-interruption: setup
 verify-load: setup
 	python tests/load.py
 
-# The sources that the stages of dvc.yaml and studies/dvc.yaml depend on, as they load and read them.
+# The sources that the stages depend on, as they load and read them, into the files of stages.
 sources: setup
 	python tests/stage_sources.py
 

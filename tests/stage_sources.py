@@ -1,7 +1,8 @@
 """The sources of every stage: what of the package it loads and reads while it runs.
 
 ``python tests/stage_sources.py`` (``make sources``) runs all stages at a tiny scale and writes the
-lists of sources in ``dvc.yaml`` and ``studies/dvc.yaml`` anew; ``test_stage_sources.py`` compares.
+lists of sources in ``dvc.yaml``, ``studies/dvc.yaml`` and ``cases/dvc.yaml`` anew;
+``test_stage_sources.py`` compares.
 """
 
 import ast
@@ -14,6 +15,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from importlib import import_module
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import yaml
 
@@ -22,16 +24,17 @@ PACKAGE = Path("src", "guided_lgp")
 DESCRIPTIONS = PACKAGE / "shipped" / "robots"
 """A folder per robot: meshes, which PyBullet and pinocchio open unseen, and what names them."""
 NETWORKS = ("instruction", "grasp", "place")
+FAMILIES = ("rows", "rows_decoys")
 
 Stage = tuple[str, str]
 """A file of stages, and one of its stages."""
-Call = tuple[str, str, tuple[str, ...]]
+Call = tuple[str, str, tuple[object, ...]]
 """Module, function and further arguments of a run in a folder."""
 
-PIPELINE, STUDIES = "dvc.yaml", "studies/dvc.yaml"
+PIPELINE, STUDIES, CASES = "dvc.yaml", "studies/dvc.yaml", "cases/dvc.yaml"
 
 
-def _stage(name: str, *arguments: str, room: str = "experiments") -> Call:
+def _stage(name: str, *arguments: object, room: str = "experiments") -> Call:
     return f"guided_lgp.{room}.{name}", "run", arguments
 
 
@@ -59,6 +62,15 @@ RUNS: Mapping[Stage, Sequence[Call]] = {
     ],
     (STUDIES, "feasibility"): [_study("feasibility", "run")],
     (STUDIES, "render"): [_study("tables", "render")],
+    (CASES, "demonstrate"): [_stage("demonstrate", case, room="cases") for case in FAMILIES],
+    (CASES, "train_case"): [_stage("train", case, 1, room="cases") for case in FAMILIES],
+    (CASES, "evaluate_case"): [
+        _stage("evaluate", case, training, room="cases")
+        for case in FAMILIES
+        for training in ("rivals", "1")
+    ],
+    (CASES, "replay_case"): [_stage("replay", case, room="cases") for case in FAMILIES],
+    (CASES, "collect_cases"): [_stage("collect", room="cases")],
 }
 """Every stage, after those whose output it needs."""
 
@@ -70,12 +82,14 @@ _INFRASTRUCTURE = [
     "parallel",
     "params",
     "paths",
+    "sources",
     "tables",
 ]
 INFRASTRUCTURE = {PACKAGE / f"{name}.py" for name in ("__init__", *_INFRASTRUCTURE)}
 """What does not determine a stage's results: fan-out, messages, places."""
-UNUSED = {(PIPELINE, "enumerate_sequences"): PACKAGE / "bounds" / "path"}
-"""What a stage loads without calling it: the enumeration wants coarse verdicts only."""
+_COARSE_ONLY = [(PIPELINE, "enumerate_sequences"), (CASES, "demonstrate")]
+UNUSED = dict.fromkeys(_COARSE_ONLY, PACKAGE / "bounds" / "path")
+"""What a stage loads without calling it."""
 HOUSES = {
     PACKAGE / name for name in ("domains", "robots", "bounds/terms", "policy", "scene/families")
 }
@@ -105,9 +119,10 @@ TINY: Mapping[str, Mapping[str, object]] = {
 
 
 def write_tiny_parameters(root: Path) -> None:
-    """The parameters of the pipeline and of the studies at a tiny scale."""
+    """The parameters of the pipeline, the cases and the studies at a tiny scale."""
     small = yaml.safe_load((ROOT / "tests" / "params.yaml").read_text())
     tiny = {section: values | TINY.get(section, {}) for section, values in small.items()}
+    tiny["cases"] = {name: case | {"seeds": [1]} for name, case in small["cases"].items()}
     (root / "params.yaml").write_text(yaml.safe_dump(tiny))
     study = yaml.safe_load((ROOT / "studies" / "params.yaml").read_text())
     cases = {name: study["cases"][name] | {"configurations": 3} for name in ("paper", "relational")}
@@ -123,9 +138,9 @@ def write_tiny_parameters(root: Path) -> None:
 def run_all(root: Path) -> Iterator[tuple[Stage, frozenset[Path]]]:
     """Run every stage in an empty folder, each in a process of its own; the sources of each."""
     write_tiny_parameters(root)
-    for file in (PIPELINE, STUDIES):
+    for file in (PIPELINE, STUDIES, CASES):
+        (root / file).parent.mkdir(exist_ok=True)
         (root / file).write_bytes((ROOT / file).read_bytes())
-    (root / "src").symlink_to(ROOT / "src")
     for stage, calls in RUNS.items():
         command = [sys.executable, __file__, json.dumps(calls)]
         done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=False)
@@ -144,21 +159,22 @@ def run_noting(calls: Iterable[Call]) -> set[str]:
 
     sys.addaudithook(note)
     folder = Path.cwd()
-    for module, function, arguments in calls:
-        run: Callable[..., None] = getattr(import_module(module), function)
-        if module.startswith("guided_lgp.studies"):
-            run(folder, *arguments)
-        else:
-            from guided_lgp.params import load_params
+    with mock.patch("guided_lgp.sources.source_digest", return_value=""):  # reads what is listed
+        for module, function, arguments in calls:
+            run: Callable[..., None] = getattr(import_module(module), function)
+            if module.startswith("guided_lgp.studies"):
+                run(folder, *arguments)
+            else:
+                from guided_lgp.params import load_params
 
-            run(load_params(folder / "params.yaml"), folder, *arguments)
+                run(load_params(folder / "params.yaml"), folder, *arguments)
     loaded = {getattr(module, "__file__", None) or "" for module in list(sys.modules.values())}
     return loaded | {file for file in read if not file.endswith((".py", ".pyc"))}
 
 
 def _of_the_package(files: Iterable[str], unused: Path | None) -> frozenset[Path]:
     """Those that determine results, relative to the clone; of a robot's description its folder."""
-    paths = map(Path, files)  # those in the folder of the run are read for digests alone
+    paths = map(Path, files)
     inside = {path.relative_to(ROOT) for path in paths if path.is_relative_to(ROOT / PACKAGE)}
     wanted = {
         DESCRIPTIONS / file.relative_to(DESCRIPTIONS).parts[0]

@@ -6,16 +6,19 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 
+from guided_lgp import sources
 from guided_lgp.cases import collect, demonstrate, train
 from guided_lgp.cases.declared import declared_case
 from guided_lgp.cases.policies import FULL, SHUFFLED, SIGHTS, models_of
 from guided_lgp.cases.shards import run_kept
-from guided_lgp.documents import read_json
+from guided_lgp.documents import read_json, write_text
 from guided_lgp.domains import load_domain
 from guided_lgp.errors import InputError
 from guided_lgp.logic import applicable_actions
 from guided_lgp.params import Parallel, Params, load_params
+from guided_lgp.paths import CASES
 from guided_lgp.policy.relational.inference import load_relational
 from guided_lgp.policy.relational.samples import Examples
 from guided_lgp.policy.tensors import write_tensors
@@ -120,14 +123,31 @@ def double(number: int) -> int:
 def test_results_are_kept_and_damaged_ones_made_again(tmp_path: Path) -> None:
     settings = Parallel(backend="loky", workers=1)
     tasks = [(number, number) for number in range(3)]
-    assert run_kept(double, tasks, tmp_path, settings, "doubling") == [0, 2, 4]
+    assert run_kept(double, tasks, tmp_path, settings, "demonstrate", "doubling") == [0, 2, 4]
     files = sorted(tmp_path.iterdir())
     kept = {file: file.stat().st_mtime_ns for file in files}
     files[0].write_text("{")
-    assert run_kept(double, tasks[:2], tmp_path, settings, "doubling") == [0, 2]
+    assert run_kept(double, tasks[:2], tmp_path, settings, "demonstrate", "doubling") == [0, 2]
     left = sorted(tmp_path.iterdir())
     assert len(left) == 2
     assert all(file.stat().st_mtime_ns == kept[file] for file in left if file != files[0])
+
+
+def test_results_of_other_sources_are_not_used(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clone, kept = tmp_path / "clone", tmp_path / "kept"
+    stage = {"foreach": ["rows"], "do": {"deps": ["data/rows.json", "src/half.py"]}}
+    write_text(clone / CASES, yaml.safe_dump({"stages": {"halve": stage}}))
+    monkeypatch.setattr(sources, "SOURCES", clone)
+    settings = Parallel(backend="loky", workers=1)
+    names = []
+    for half, other in (("n / 2", ""), ("n / 2", "pi"), ("n // 2", "pi")):
+        write_text(clone / "src" / "half.py", half)
+        write_text(clone / "src" / "other.py", other)
+        run_kept(double, [(1, 1)], kept, settings, "halve", "doubling")
+        names.append([file.name for file in kept.iterdir()])
+    assert names[0] == names[1] != names[2]
 
 
 def row(training: str, solved: bool, calls: int, **more: Any) -> dict[str, Any]:

@@ -22,6 +22,7 @@ DESCRIPTIONS = SHIPPED / "robots"
 
 # What the stages read and write, relative to the folder of dvc.yaml.
 PIPELINE = Path("dvc.yaml")
+CASES = Path("cases/dvc.yaml")
 PARAMS = Path("params.yaml")
 SCENES = Path("data/scenes")
 SEQUENCES = Path("data/sequences")

@@ -7,6 +7,7 @@ import pyarrow.parquet as pq
 import pytest
 import yaml
 
+from guided_lgp import sources
 from guided_lgp.bounds.results import CoarseResult, Failure
 from guided_lgp.errors import InputError
 from guided_lgp.experiments import enumerate_sequences
@@ -160,7 +161,7 @@ def test_shards_of_other_sources_are_not_used(
     tmp_path: Path, params: Params, scripted: type[OneHand], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     root = make_root(tmp_path)
-    monkeypatch.setattr(enumerate_sequences, "SOURCES", root)
+    monkeypatch.setattr(sources, "SOURCES", root)
     enumerate_sequences.run(params, root)
     (root / "src" / "other.py").write_text("of another case")
     enumerate_sequences.run(params, root)

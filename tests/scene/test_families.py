@@ -1,17 +1,20 @@
 """Families of random problems: reproducible, as their rules say, and never drawn for ever."""
 
+from pathlib import Path
+
 import pytest
 
 from guided_lgp.errors import InputError
-from guided_lgp.scene.families import FAMILIES, draw_problems, family, find_family
+from guided_lgp.scene import families
+from guided_lgp.scene.families import draw_problems, family, family_names, find_family
 from guided_lgp.scene.families.rows import Rows, chain
 from guided_lgp.scene.validate import validate_scene
 
 
-@pytest.mark.parametrize("name", FAMILIES)
+@pytest.mark.parametrize("name", family_names())
 @pytest.mark.parametrize("size", [3, 5])
 def test_problems_are_valid_and_follow_the_rules(name: str, size: int) -> None:
-    declared = FAMILIES[name]
+    declared = find_family(name)
     layout = declared.layout()
     for drawn in draw_problems(declared, layout, size, 3, 1, "test"):
         validate_scene(drawn.scene, name)
@@ -57,3 +60,14 @@ def test_a_family_that_rejects_everything_says_why(monkeypatch: pytest.MonkeyPat
 def test_an_unknown_family_is_refused() -> None:
     with pytest.raises(InputError, match=r"unknown family 'heaps' .*rows, rows_decoys"):
         find_family("heaps")
+
+
+def test_a_file_without_its_family_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "heaps.py").write_text("from guided_lgp.scene.families.rows import FAMILY")
+    monkeypatch.setattr(families, "__path__", [*families.__path__, str(tmp_path)])
+    with pytest.raises(InputError, match=r"heaps\.py: FAMILY: is missing or has another name"):
+        find_family("heaps")
+    with pytest.raises(InputError, match=r"unknown family 'piles' \(accepted: heaps, rows, "):
+        find_family("piles")

@@ -75,9 +75,9 @@ def run(params: Params, root: Path, name: str) -> None:
     case = declared_case(params, name)
     tasks = [(task, _content(task)) for task in _tasks(case, params)]
     folder = root / "data" / name
-    parts = run_kept(
-        demonstrate, tasks, folder / ".demonstrations", params.parallel, f"{name}: demonstrations"
-    )
+    shards = folder / ".demonstrations"
+    description = f"{name}: demonstrations"
+    parts = run_kept(demonstrate, tasks, shards, params.parallel, "demonstrate", description)
     rows = [row for part in parts for row in part]
     grippers = len(load_robot(case.params.robot).grippers)
     write_tensors(demonstrations_of(root, name), label_arrays(rows, grippers))

@@ -58,7 +58,8 @@ def run(params: Params, root: Path, name: str, training: str) -> None:
     case = declared_case(params, name)
     tasks = [(task, _content(task)) for task in _tasks(case, params, root, training)]
     shards = root / "data" / name / f".evaluation-{training}"
-    parts = run_kept(compare, tasks, shards, params.parallel, f"{name}: evaluation {training}")
+    description = f"{name}: evaluation {training}"
+    parts = run_kept(compare, tasks, shards, params.parallel, "evaluate_case", description)
     rows = [row for part in parts for row in part]
     times = [
         {

@@ -3,19 +3,18 @@
 import json
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from functools import cache
 from hashlib import sha256
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-import guided_lgp
 from guided_lgp import parallel
 from guided_lgp.documents import read_json, write_json
 from guided_lgp.errors import InputError
 from guided_lgp.params import Parallel
+from guided_lgp.paths import CASES
+from guided_lgp.sources import source_digest
 
 Task = TypeVar("Task")
-_SOURCES = ("logic", "domains", "robots", "scene", "bounds", "search", "policy", "cases")
 
 
 @dataclass(frozen=True)
@@ -30,18 +29,21 @@ def run_kept(
     tasks: Iterable[tuple[Task, Any]],
     folder: Path,
     settings: Parallel,
+    stage: str,
     description: str,
 ) -> list[Any]:
     """Apply a function to every task, unless its result is there already.
 
     Args:
         function: importable; gives something that JSON can hold.
-        tasks: each with what its result depends on, beside the source code.
+        tasks: each with what its result depends on, beside the sources.
         folder: for the results; what is there of other tasks is removed.
         settings: back end and workers.
+        stage: of ``cases/dvc.yaml``, whose sources results depend on.
         description: a few words for the progress display.
     """
-    kept = [_Kept(function, task, folder / _name(content)) for task, content in tasks]
+    sources = source_digest(CASES, stage)
+    kept = [_Kept(function, task, folder / _name(content, sources)) for task, content in tasks]
     wanted = {one.file for one in kept}
     for other in folder.iterdir() if folder.is_dir() else ():
         if other not in wanted:
@@ -57,17 +59,6 @@ def _write(kept: _Kept[Any]) -> None:
         write_json(kept.file, kept.function(kept.task))
 
 
-def _name(content: Any) -> str:
-    text = json.dumps([content, _sources()], sort_keys=True)
+def _name(content: Any, sources: str) -> str:
+    text = json.dumps([content, sources], sort_keys=True)
     return sha256(text.encode()).hexdigest()[:24] + ".json"
-
-
-@cache
-def _sources() -> str:
-    """Digest of the code that results depend on."""
-    package, digest = Path(guided_lgp.__file__).parent, sha256()
-    for part in _SOURCES:
-        for path in sorted((package / part).rglob("*")):
-            if path.suffix in {".py", ".yaml", ".c", ".h"}:
-                digest.update(path.read_bytes())
-    return digest.hexdigest()

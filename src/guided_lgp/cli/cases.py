@@ -10,15 +10,12 @@ from guided_lgp.cli.alone import alone
 from guided_lgp.cli.running import within
 from guided_lgp.cli.stages import end_with_dvc
 from guided_lgp.cli.terminal import ParamsFile, TimeLimit
-from guided_lgp.paths import PARAMS
+from guided_lgp.paths import CASES, PARAMS
 
 if TYPE_CHECKING:
     from guided_lgp.params import Params
 
 app = typer.Typer()
-
-FILE = "cases/dvc.yaml"
-"""Declares these stages."""
 
 CaseName = Annotated[str, typer.Option("--case", help="A case of params.yaml.")]
 
@@ -125,6 +122,6 @@ def _run(
     params, root = load_params(params_file), Path.cwd()
     for name in params.cases if case is None else [case]:
         declared_case(params, name)
-    address = f"{FILE}:{stage}"
+    address = f"{CASES}:{stage}"
     with within(timeout, address), alone(root, address), tracking.recorded(address, params):
         work(root, params)

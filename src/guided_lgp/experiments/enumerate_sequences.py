@@ -21,7 +21,7 @@ import pyarrow as pa
 from guided_lgp import parallel
 from guided_lgp.bounds.results import CoarseResult
 from guided_lgp.bounds.scene_bounds import SceneBounds
-from guided_lgp.documents import made_whole, read_yaml, remove, write_text
+from guided_lgp.documents import made_whole, remove, write_text
 from guided_lgp.errors import InputError
 from guided_lgp.logic import (
     format_objective,
@@ -30,11 +30,12 @@ from guided_lgp.logic import (
     two_goal_objectives,
 )
 from guided_lgp.params import BoundsParams, EnumerateSequences, Params
-from guided_lgp.paths import PIPELINE, SCENES, SEQUENCES, SOURCES
+from guided_lgp.paths import PIPELINE, SCENES, SEQUENCES
 from guided_lgp.scene import Scene, load_scenes
 from guided_lgp.search.enumerate import Enumeration, enumerate_sequences
 from guided_lgp.search.observation import observe_all, start
 from guided_lgp.sequences import SHORTEST, STAGE, VERDICTS
+from guided_lgp.sources import source_digest
 from guided_lgp.tables import read_columns, write_table
 
 SPLITS = ("training", "test")
@@ -72,7 +73,8 @@ def run(params: Params, root: Path) -> None:
     """Write ``data/sequences/{training,test}.parquet`` and ``{training,test}_shortest.parquet``."""
     folder = root / SEQUENCES.parent / ".shards"
     splits = {name: load_scenes(root / SCENES / f"{name}.json").scenes for name in SPLITS}
-    given = params.bounds, params.enumerate_sequences, source_digest(), folder
+    sources = source_digest(PIPELINE, STAGE)
+    given = params.bounds, params.enumerate_sequences, sources, folder
     tasks = {name: [Task(scene, *given) for scene in scenes] for name, scenes in splits.items()}
     whole = [task for split in tasks.values() for task in split]
     _remove_others(folder, {task.shard for task in whole})
@@ -177,23 +179,3 @@ def _states(scene: Scene, verdicts: Iterable[CoarseResult]) -> Iterator[list[flo
     for verdict in feasible:
         positions = [list(next(seen).values()) for _ in range(1 + len(verdict.skeleton))]
         yield np.array(positions).ravel().tolist()
-
-
-def source_digest() -> str:
-    """Digest of the sources that dvc.yaml lists for this stage: those of the clone that runs it.
-
-    Raises:
-        InputError: dvc.yaml is missing or damaged.
-    """
-    digest = sha256()
-    for source in read_yaml(SOURCES / PIPELINE)["stages"][STAGE]["deps"]:
-        if Path(source).is_relative_to("src"):
-            for file in _files(SOURCES / source):
-                digest.update(file.read_bytes())
-    return digest.hexdigest()
-
-
-def _files(path: Path) -> list[Path]:
-    """The file itself, or the files of a folder."""
-    found = path.rglob("*") if path.is_dir() else (path,)
-    return sorted(file for file in found if file.is_file() and "__pycache__" not in file.parts)

@@ -1,0 +1,34 @@
+"""The sources of the clone that runs, as far as a stage depends on them."""
+
+from hashlib import sha256
+from pathlib import Path
+
+from guided_lgp.documents import read_yaml
+from guided_lgp.paths import SOURCES
+
+_PACKAGE = Path("src")
+
+
+def source_digest(stages: Path, name: str) -> str:
+    """Digest of the sources that a file of stages lists for one of them.
+
+    Args:
+        stages: the file, relative to the clone.
+        name: the stage; for one of several, without what tells it from the others.
+
+    Raises:
+        InputError: the file is missing or damaged.
+    """
+    declared = read_yaml(SOURCES / stages)["stages"][name]
+    digest = sha256()
+    for dependency in declared.get("do", declared)["deps"]:
+        if Path(dependency).is_relative_to(_PACKAGE):
+            for file in _files(SOURCES / dependency):
+                digest.update(file.read_bytes())
+    return digest.hexdigest()
+
+
+def _files(path: Path) -> list[Path]:
+    """The file itself, or the files of a folder."""
+    found = path.rglob("*") if path.is_dir() else (path,)
+    return sorted(file for file in found if file.is_file() and "__pycache__" not in file.parts)
