@@ -13,6 +13,7 @@ from guided_lgp.bounds.verify.attachments import switches_of
 from guided_lgp.bounds.verify.geometry import declared, grasp_faults, placement_faults
 from guided_lgp.bounds.verify.joints import finger_faults, limit_faults
 from guided_lgp.bounds.verify.phase import Phase
+from guided_lgp.bounds.verify.touching import Touch, touches
 from guided_lgp.logic import Skeleton, State, successor
 from guided_lgp.scene.tolerances import MARGIN
 from guided_lgp.scene.world import World, initial_poses
@@ -82,18 +83,19 @@ def _walk(
     for action in skeleton:
         states.append(successor(states[-1], action))
     states.append(states[-1])  # no action ends the last mode
-    boxes, before = initial_poses(world.scene), states[0]
-    collisions = _Collisions(world)
+    boxes = initial_poses(world.scene)
+    tools = world.scene.robot.tool_poses(q[:, : len(world.scene.robot.description.joint_names)])
+    collisions = _Collisions(world, touches(world.scene, skeleton, switches, tools), times)
     for index, (first, last) in enumerate(pairwise([0, *switches, len(times) - 1])):
         state, after = states[index], states[index + 1]
         rows = slice(first, last + 1)
         phase = Phase(world.scene, state, boxes, q[rows], times[rows])
-        violation = phase.tilt_fault(goals.upright) or collisions.first_fault(phase, before, after)
+        violation = phase.tilt_fault(goals.upright) or collisions.first_fault(phase)
         violation = violation or _contact_fault(phase, after)
         if violation is not None:
             violation = replace(violation, action=min(index, len(skeleton) - 1))
             return PathReport(violation, collisions.checked, collisions.deepest)
-        boxes, before = phase.boxes_at(-1), state
+        boxes = phase.boxes_at(-1)
     missed = next(iter(goals.faults(world.scene, boxes)), None)
     if missed is not None:
         missed = replace(missed, action=len(skeleton) - 1, time=float(times[-1]))
@@ -107,8 +109,9 @@ class _Collisions:
     which coal finds the same convex hulls nearer to each other than its padding.
     """
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: World, allowed: list[Touch], times: Array) -> None:
         self._world = world
+        self._allowed, self._times = allowed, times
         self._robot = world.scene.robot.description
         self._checker = checker_of(world.scene)
         self.checked = 0
@@ -116,13 +119,14 @@ class _Collisions:
         self.deepest = 0.0
         """Deepest penetration (m) outside the declared contacts so far."""
 
-    def first_fault(self, phase: Phase, before: State, after: State) -> Violation | None:
-        """The first collision of a phase, between the modes before and after it."""
-        touches, support = phase.touches(before, after), dict(phase.state.support)
+    def first_fault(self, phase: Phase) -> Violation | None:
+        """The first collision of a phase."""
+        may_touch = phase.touches(self._allowed, self._times)
+        support = dict(phase.state.support)
         self.checked += len(phase.q)
         for sample in self._judged(phase):
             for overlap in phase.overlaps(self._world, sample):
-                if declared(overlap, self._robot, touches[sample], support):
+                if declared(overlap, self._robot, may_touch[sample], support):
                     continue
                 self.deepest = max(self.deepest, overlap.depth)
                 if overlap.depth > MARGIN:

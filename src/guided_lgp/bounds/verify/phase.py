@@ -1,6 +1,6 @@
 """The motion of a plan in one mode, in small steps, and the boxes along it."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from itertools import product
 
 import numpy as np
@@ -8,6 +8,7 @@ import numpy as np
 from guided_lgp.bounds.checks import Violation, box_sizes
 from guided_lgp.bounds.results import Array
 from guided_lgp.bounds.terms.level import CARRY_ANGLE
+from guided_lgp.bounds.verify.touching import Touch
 from guided_lgp.logic import State
 from guided_lgp.poses import apply, compose, inverse, tilt
 from guided_lgp.robots import Arm
@@ -16,9 +17,6 @@ from guided_lgp.scene.world import Penetration, World
 
 STEP = 0.01
 """Longest way (m) that any point of robot or load goes between two checked configurations."""
-APPROACH = 0.12
-"""The hand may touch a box that it does not hold while its tool frame is this near (m) to where
-it grasps or places it."""
 _COARSE_STEP = 0.02
 """Longest way (m), by the levers' bound, between samples at which ways are measured."""
 _CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)))
@@ -67,19 +65,18 @@ class Phase:
         """Pose (7,) of all tool frames."""
         return {gripper: poses[sample] for gripper, poses in self._tools.items()}
 
-    def touches(self, before: State, after: State) -> list[set[tuple[str, str]]]:
+    def touches(self, allowed: Iterable[Touch], times: Array) -> list[set[tuple[str, str]]]:
         """For each sample, the pairs of a box and a gripper that may touch it.
 
-        Beside those that hold it: near its ends, those that let go of it as the phase begins, or
-        take hold of it as it ends.
+        Args:
+            allowed: between rows of the motion.
+            times: (T,) s, of these rows.
         """
-        touches = [set(self.state.held) for _ in self.q]
-        for other, end in ((before, 0), (after, -1)):
-            for box, gripper in set(other.held) ^ set(self.state.held):
-                path = self._tools[gripper][:, :3]
-                near = np.linalg.norm(path - path[end], axis=1) <= APPROACH
-                for sample in np.flatnonzero(near):
-                    touches[sample].add((box, gripper))
+        touches: list[set[tuple[str, str]]] = [set() for _ in self.q]
+        for touch in allowed:
+            first, last = np.searchsorted(self.times, times[[touch.start, touch.end]])
+            for sample in range(first, min(last + 1, len(touches))):
+                touches[sample].add((touch.box, touch.gripper))
         return touches
 
     def tilt_fault(self, upright: Collection[str] = ()) -> Violation | None:
