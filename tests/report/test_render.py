@@ -227,13 +227,16 @@ def test_rendering_again_gives_the_same_bytes_and_other_figures_are_optional(
     new = {str(path) for path in after.keys() - before.keys()}
     assert new == {"reports/metrics/geometry.json", "reports/studies/spread.json"} | {
         f"reports/tables/{name}.{suffix}"
-        for name in ("geometry", "draws", "case_rows")
+        for name in ("geometry", "draws", "case_rows", "cases_compared")
         for suffix in ("md", "tex", "csv")
-    }
+    } | {"reports/figures/cases.png", "reports/figures/cases.svg"}
     assert all(after[path] == content for path, content in before.items())
     page = (root / "reports/report.html").read_text(encoding="utf-8")
     assert "The two bounds of the NLP on random sequences" in page
-    assert "The policy needs at most half the calls at every size." in page
+    assert "half the calls of the best search without one at every size." in page
+    assert "needs 6.5, 6.5 calls of the coarse bound" in page
+    (rival, *_) = rows_of(root / "reports/tables/cases_compared.md")
+    assert rival[3:6] == ["18.5", "A\\*, facts", "0.35 (0.30 to 0.40)"]
     assert "then learning is a convenience, not a necessity" in page
     assert '<a href="../docs/studies.md">' in page
     rows = {row[0]: row[1:] for row in rows_of(root / "reports/tables/draws.md")}

@@ -127,6 +127,8 @@ def compose(
     if "geometry" in tables:
         geometry.append(tables["geometry"])
     answers = findings.answers(inputs.generalization, inputs.scalability, inputs.timing)
+    if rows := (inputs.cases_compared or {}).get("rows"):
+        answers.append(f"Where geometry decides, as in crowded rows: {cases.headline(rows)}")
     sections = [
         Section("Question and answer", [findings.QUESTION, Bullets(answers)]),
         Section("Generalization", generalization),
@@ -156,6 +158,13 @@ def _cases(inputs: Inputs, tables: Mapping[str, Table]) -> Iterator[Block]:
     assert inputs.cases_compared is not None
     yield cases.QUESTION
     yield Bullets(cases.answers(inputs.cases_compared))
+    yield tables["cases_compared"]
+    yield Picture(
+        "cases.svg",
+        "Calls of the coarse bound against the number of boxes",
+        "Means over scenes and trainings; a search without a plan within 100 calls counts as 100. "
+        "Dashed: greedy.",
+    )
     for name in inputs.cases:
         yield tables[f"case_{name}"]
         yield Links([(f"{name}/replay.html", "One plan as a 3D replay in the browser")])

@@ -137,6 +137,7 @@ class CaseFigures(_Figures):
     solved: Count
     solved_min: Count
     calls_mean: Number | None
+    calls_limited_mean: Number
     infeasible_calls_mean: Number | None
     failed_candidates_mean: Number | None
     plan_length_mean: Number | None

@@ -6,6 +6,7 @@ from guided_lgp.documents import write_text
 from guided_lgp.errors import InputError
 from guided_lgp.paths import REPORTS
 from guided_lgp.report import paper
+from guided_lgp.report.cases import headline
 from guided_lgp.report.cells import NONE
 from guided_lgp.report.drawing import save
 from guided_lgp.report.findings import many, pair, tree
@@ -20,7 +21,10 @@ RESULTS = Path("docs/results.md")
 IMAGES = Path("docs/images")
 TABLES = ("winners", "table_1", "table_3_tree_size", "table_3_time", "table_3_details", "training")
 """Files of ``reports/tables`` that the page of results has."""
-OPTIONAL = ("case_rows", "case_rows_decoys", "draws", "unseen", "enumeration", "geometry")
+OPTIONAL = (
+    *("cases_compared", "case_rows", "case_rows_decoys"),
+    *("draws", "unseen", "enumeration", "geometry"),
+)
 """Those that are there once ``make cases``, ``make study`` and ``make bench`` have run."""
 _INTRODUCTION = """\
 # Results
@@ -95,17 +99,7 @@ def _rows(sizes: Metrics) -> list[str]:
     """What learning is worth where geometry decides, once ``make cases`` has run."""
     if not sizes:
         return []
-    compared = [one["with_facts"] for one in sizes.values()]
-    ours, rivals = (", ".join(f"{one[key]:.1f}" for one in compared) for key in _CALLS)
-    return [
-        "Where geometry decides, as in [crowded rows](docs/cases.md), a policy trained on three "
-        f"boxes needs {ours} calls of the coarse bound to a plan of {', '.join(sizes)} boxes, the "
-        f"best search without learning {rivals}.",
-        "",
-    ]
-
-
-_CALLS = ("calls", "rival_calls")
+    return [f"Where geometry decides, as in [crowded rows](docs/cases.md), {headline(sizes)}", ""]
 
 
 def _shares(shares: Metrics) -> list[str]:

@@ -73,4 +73,5 @@ def _apart(shares: Any) -> tuple[list[str], dict[str, float]]:
 
 
 def _least(shares: Mapping[str, float]) -> str:
-    return f"at least {percent(min(shares.values(), default=0.0))}"
+    least = percent(min(shares.values(), default=0.0))
+    return least if least == percent(1.0) else f"at least {least}"

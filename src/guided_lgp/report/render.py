@@ -15,6 +15,7 @@ from guided_lgp.paths import METRICS, REPORTS
 from guided_lgp.policy.split import training_objectives
 from guided_lgp.report import (
     analysis,
+    case_figures,
     cases,
     figures,
     panels,
@@ -101,6 +102,7 @@ def _tables(
     optional = [tables.geometry(inputs.geometry)] if inputs.geometry is not None else []
     optional += [tables.draws(inputs.spread)] if inputs.spread is not None else []
     optional += [cases.table(name, sizes) for name, sizes in (inputs.cases or {}).items()]
+    optional += [cases.comparison(inputs.cases_compared)] if inputs.cases_compared else []
     return [
         tables.generalization(inputs.generalization, calls),
         tables.unseen(analysis.by_novelty(inputs.problems, novelty), novelty),
@@ -123,6 +125,7 @@ def _write_curves(inputs: Inputs, folder: Path) -> None:
 def _drawings(inputs: Inputs, params: Params) -> Mapping[str, Drawing]:
     limit = params.compare_scalability.max_tree_size
     failures = analysis.failures(inputs.verdicts, inputs.configurations)
+    optional = {"cases": Drawing(case_figures.calls(inputs.cases))} if inputs.cases else {}
     return {
         "tree_size": Drawing(scalability_figures.tree_size(inputs.scalability, limit)),
         "time": Drawing(scalability_figures.time(inputs.scalability, inputs.timing)),
@@ -131,6 +134,7 @@ def _drawings(inputs: Inputs, params: Params) -> Mapping[str, Drawing]:
         "confusion": panels.confusion(inputs),
         "feasible_share": panels.feasible_share(inputs),
         "failures": Drawing(figures.failures(failures)),
+        **optional,
     }
 
 
