@@ -8,11 +8,15 @@ its origin on the floor under the robot's base.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from guided_lgp.logic import Skeleton
+
+if TYPE_CHECKING:
+    from guided_lgp.bounds.path.situation import Step
 
 Array = NDArray[np.float64]
 
@@ -93,4 +97,6 @@ class PathResult:
     failure: Failure | None = None
     verification: Mapping[str, object] = field(default_factory=dict)
     """Figures of the check in PyBullet: number of configurations, deepest penetration (m)."""
+    steps: "tuple[Step, ...]" = field(default=(), compare=False, repr=False)
+    """One after the other, as they were found: what the trajectory was made of."""
     time_s: float = field(default=0.0, compare=False)

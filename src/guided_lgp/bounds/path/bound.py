@@ -120,6 +120,7 @@ class PathBound:
                     "configurations": report.configurations,
                     "deepest_penetration_m": report.deepest_penetration,
                 },
+                steps=tuple(steps),
                 time_s=time.perf_counter() - began,
             )
         failure = Failure(

@@ -89,7 +89,7 @@ def _joined(mover: Mover, motions: Sequence[Motion]) -> list[Motion]:
     for i, piece in enumerate(pieces):
         transit = piece[0].transit
         if transit is not None:
-            path = _optimised(mover, transit, paths[i], lines.get(i - 1), lines.get(i + 1))
+            path = optimal_path(mover, transit, paths[i], lines.get(i - 1), lines.get(i + 1))
             optimised |= {} if path is None else {i: path}
     result: list[Motion] = []
     for i, piece in enumerate(pieces):
@@ -111,10 +111,10 @@ def _freedom(motion: Motion) -> bool | None:
     return None if motion.transit is None else motion.transit.keep_level
 
 
-def _optimised(
+def optimal_path(
     mover: Mover, transit: Transit, path: Array, before: Array | None, after: Array | None
 ) -> Array | None:
-    """The best free spline (m, n) between the ends of a path, or None.
+    """The best free spline (m, n) found between the ends of a path, or None.
 
     The first round has no constraints but the joint limits: most motions are then done. The
     others start again from the path, in steps for which the linearisation holds.
