@@ -39,6 +39,8 @@ ELEVEN = [f"(on b{number} right)" for number in range(1, 12)]
         ("ycb_name", ["(on 003_cracker_box right)"], 2),
         # Every pair of parallel sides is a grasp, not the narrower one alone.
         ("cube_blocked_along_y", ["(on target right)"], 2),
+        # A cylinder is taken from all around: here from aslant.
+        ("can_between_walls", ["(on can right)"], 2),
         # Small bodies are held by the fingertips.
         ("cubes_25mm", ["(on c1 c3)", "(on c2 c1)"], 4),
         # The hand opens as far as the box asks, and goes between neighbours.

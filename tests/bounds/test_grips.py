@@ -8,7 +8,7 @@ from guided_lgp.bounds.path.grips import Grips, grips_of
 from guided_lgp.bounds.program.geometry import SceneGeometry
 from guided_lgp.bounds.verify.geometry import grasp_faults
 from guided_lgp.logic import parse_skeleton
-from guided_lgp.poses import pose, quaternion
+from guided_lgp.poses import compose, pose, quaternion
 from guided_lgp.robots import load_robot
 from guided_lgp.robots.robot import CLEARANCE
 from guided_lgp.scene import Box, Scene, Table
@@ -54,6 +54,19 @@ def test_verification_accepts_every_grip(size: tuple[float, float, float]) -> No
         for rotation, offset in zip(part.rotation, part.offset, strict=True):
             tool = [*offset.tolist(), *quaternion(rotation).tolist()]
             assert grasp_faults(ARM, "red", body.convex, placement, tool) == []
+
+
+def test_a_cylinder_is_held_all_around() -> None:
+    can = box(0.06, 0.06, 0.12).model_copy(update={"shape": "cylinder"})
+    placement, headings = pose((0.0, 0.0, 0.0), 0.3).tolist(), set[int]()
+    for _, part in every(grips_of(can, ARM)):
+        for rotation, offset in zip(part.rotation, part.offset, strict=True):
+            tool = compose(np.array(placement), np.array([*offset, *quaternion(rotation)]))
+            assert grasp_faults(ARM, "red", can.convex, placement, tool.tolist()) == []
+            headings.add(round(np.degrees(np.arctan2(*rotation[:2, 1])) % 180, 1))
+            beside = compose(tool, pose((0.0, 0.01, 0.0)))
+            assert grasp_faults(ARM, "red", can.convex, placement, beside.tolist())
+    assert sorted(headings) == [22.5 * step for step in range(8)]
 
 
 def test_some_grips_are_from_above_some_from_the_sides_some_by_the_fingertips_only() -> None:

@@ -144,6 +144,17 @@ def test_names_and_order_do_not_change_a_plan(goals: list[str]) -> None:
     assert plan(turned, goals).skeleton == found.skeleton
 
 
+@pytest.mark.parametrize("yaw", [0.0, 0.3, 1.2])
+def test_a_can_turned_about_its_axis_is_the_same(tmp_path: Path, yaw: float) -> None:
+    scene = load_scene(ROOT / "tests" / "cases" / "can_between_walls.json")
+    (can,) = scene.boxes
+    turned = scene.model_copy(update={"boxes": (can.model_copy(update={"yaw": yaw}),)})
+    found = plan(turned, "(on can right)")
+    assert found.path is not None, found.explanation
+    write_plan(tmp_path / "plan.json", turned, found.objective, found.path, {})
+    assert check(json.loads((tmp_path / "plan.json").read_text())) == []
+
+
 def backwards(
     scene: Scene, skeleton: Skeleton, trajectory: Trajectory
 ) -> tuple[Scene, Skeleton, Trajectory]:

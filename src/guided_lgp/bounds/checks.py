@@ -9,7 +9,9 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
-from guided_lgp.poses import Array, pose
+import numpy as np
+
+from guided_lgp.poses import Array, compose, pose
 from guided_lgp.scene import Scene
 from guided_lgp.scene.shapes import Convex
 
@@ -127,6 +129,15 @@ def closing_axis(placement: Pose, tool: Pose) -> int:
     _, closing, _ = axes_of(tool)
     cosines = [abs(dot(closing, side)) for side in axes_of(placement)]
     return cosines.index(max(cosines))
+
+
+def turned_to_fingers(placement: Pose, tool: Pose) -> Pose:
+    """A pose of a cylinder, turned about its axis such that a hand's fingers close along its y."""
+    _, closing, _ = axes_of(tool)
+    x, y, _ = (dot(closing, axis) for axis in axes_of(placement))
+    turn = pose(np.zeros(3), math.atan2(-x, y))
+    turned: list[float] = compose(np.asarray(placement), turn).tolist()
+    return turned
 
 
 def dot(first: Sequence[float], second: Sequence[float]) -> float:

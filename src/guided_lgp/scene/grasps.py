@@ -14,6 +14,10 @@ _PALM_GAP = 0.002
 _INSET = 0.003
 """How far (m) the point between the fingertips is inside the side that they press on, at least."""
 
+ROUND_TURNS = (math.pi / 4, math.pi / 8, 3 * math.pi / 8)
+"""Turns (rad) about its axis by which a cylinder is taken, beside those of a box around it: between
+two of them, the side that a hand closes on is less than 12 degrees away."""
+
 
 def grasp_axes(size: tuple[float, float, float], widest: float) -> tuple[int, ...]:
     """The box axes that fingers can close along, the narrower one first (0: x, 1: y).

@@ -63,6 +63,8 @@ class Facts:
         if hold not in self._known:
             limb = self._limbs[hold.gripper]
             sides = grasp_sides(self._geometry, hold.box, self._arms[hold.gripper].arm)
+            if self._geometry.is_round(hold.box):
+                sides = sides[:1]  # turned all around in the region
             self._known[hold] = (
                 limb is not None
                 and bool(sides)
@@ -139,8 +141,9 @@ class Facts:
         """Least and greatest x, y and yaw of the box, and the height of its centre."""
         x, y, yaw, z = self._geometry.poses[hold.support or hold.box]
         if hold.support is None:
-            place = np.array([x, y, yaw])
-            return place, place, z
+            place, turned = np.array([x, y, yaw]), np.zeros(3)
+            turned[2] = np.pi / 2 if self._geometry.is_round(hold.box) else 0.0
+            return place - turned, place + turned, z
         hx, hy, hz = self._geometry.bodies[hold.support].half
         cosine, sine = abs(np.cos(yaw)), abs(np.sin(yaw))
         own = self._geometry.bodies[hold.box].half

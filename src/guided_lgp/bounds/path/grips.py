@@ -8,10 +8,10 @@ import numpy as np
 
 from guided_lgp.bounds.program.grasp import INSET, PALM_GAP
 from guided_lgp.bounds.results import Array
-from guided_lgp.poses import rotation_matrix
+from guided_lgp.poses import pose, rotation_matrix
 from guided_lgp.robots import Arm
 from guided_lgp.scene import Box
-from guided_lgp.scene.grasps import grasp_axes
+from guided_lgp.scene.grasps import ROUND_TURNS, grasp_axes
 from guided_lgp.scene.shapes import Convex
 
 _PITCHES = 8
@@ -84,11 +84,20 @@ def _grips(body: Convex, palm_front: float, widest: float) -> dict[float, tuple[
             for flip in (1.0, -1.0):
                 frame = np.stack([approach, flip * closing, flip * third], axis=1), offset
                 (others if shift or number else central).append(frame)
+    if body.shape == "cylinder":
+        for central, others in found.values():
+            others.extend(_all_around(central))
     return {width: (_stacked(one), _stacked(other)) for width, (one, other) in found.items()}
 
 
 _Frame = tuple[Array, Array]
 """Rotation and origin of the tool frame in the box's."""
+
+
+def _all_around(frames: list[_Frame]) -> list[_Frame]:
+    """Grips of a cylinder, turned about its axis."""
+    turns = [rotation_matrix(pose(np.zeros(3), turn)[3:]) for turn in ROUND_TURNS]
+    return [(turn @ rotation, turn @ offset) for turn in turns for rotation, offset in frames]
 
 
 def _reaches(half: Array, inner: Array, palm_front: float, approach: Array, shift: Array) -> Array:

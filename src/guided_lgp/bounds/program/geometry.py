@@ -11,7 +11,7 @@ from guided_lgp.poses import apply, inverse, pose, yaw_of
 from guided_lgp.scene import Scene
 from guided_lgp.scene.bodies import Body
 from guided_lgp.scene.footprints import gap
-from guided_lgp.scene.grasps import grasp_axes
+from guided_lgp.scene.grasps import ROUND_TURNS, grasp_axes
 from guided_lgp.scene.model import Column
 from guided_lgp.scene.shapes import Convex, Vector
 
@@ -125,7 +125,8 @@ class SceneGeometry:
     def grasp_sides(self, name: str, widest: float) -> tuple[GraspSide, ...]:
         """The sides of a box that fingers, open up to ``widest`` (m), can close on.
 
-        Where they touch it, is the scene's matter if that gives the grasps.
+        Where they touch it, is the scene's matter if that gives the grasps. A cylinder has sides
+        all around.
         """
         body = self.bodies[name]
         (hx, hy, hz), (along_y, along_x) = body.half, body.sides
@@ -135,7 +136,13 @@ class SceneGeometry:
         )
         order = grasp_axes((2 * hx, 2 * hy, 2 * hz), widest)
         given = bool(self.movable[name].grasps)
-        return tuple(sides[axis] for axis in order if given or min(sides[axis].touched) > 0)
+        found = tuple(sides[axis] for axis in order if given or min(sides[axis].touched) > 0)
+        turns = ROUND_TURNS if self.is_round(name) else ()
+        return found + tuple(replace(s, turn=s.turn + turn) for turn in turns for s in found)
+
+    def is_round(self, name: str) -> bool:
+        """Whether a box is a cylinder."""
+        return self.movable[name].shape == "cylinder"
 
 
 _SHOULDER = 0.1

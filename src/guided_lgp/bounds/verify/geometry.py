@@ -3,7 +3,7 @@
 import math
 from collections.abc import Collection, Mapping
 
-from guided_lgp.bounds.checks import Pose, Violation, box_sizes, top_of, volumes
+from guided_lgp.bounds.checks import Pose, Violation, box_sizes, top_of, turned_to_fingers, volumes
 from guided_lgp.bounds.results import Array
 from guided_lgp.bounds.terms import balanced, hold, pads, stand
 from guided_lgp.robots import Arm, Robot
@@ -41,6 +41,8 @@ def grasp_faults(
     if given is not None:
         excess = hold.check_given(placement, tool, given)
         return [Violation(f"hold {arm.gripper} {box}", excess)] if excess > 0 else []
+    if body.shape == "cylinder":
+        placement = turned_to_fingers(placement, tool)
     excesses = {
         "hold": hold.check(body.size, placement, tool, arm.palm_front, arm.fingers.grasp_width),
         "pads": pads.check(body, placement, tool),
