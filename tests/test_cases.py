@@ -106,6 +106,11 @@ def test_a_goal_that_needs_a_hand_over_gets_one() -> None:
     assert result.skeleton is not None, result.explanation
     assert [action.instruction for action in result.skeleton] == ["grasp", "take", "place"]
     assert result.scene.domain == "handover"
+    for planner in ("graph", "informed"):
+        other = plan(case, "(on parcel farright)", planner, timeout=300)
+        assert other.skeleton == result.skeleton, other.explanation
+    in_no_time = plan(case, "(on parcel farright)", timeout=1e-3)
+    assert in_no_time.reason == "max_seconds"
     refused = plan(case, "(on parcel farright)", domain="pick_and_place", timeout=300)
     assert refused.finding is not None
     assert refused.explanation.startswith("parcel can be taken by pr2L, which cannot put it on far")

@@ -193,6 +193,8 @@ def plan(
         return attempts.result(_only_timed(problem))
     if not chosen:
         problem = replace(problem, widened=partial(attempts.widened, params.bounds))
+        if not search.widens and (wider := problem.widened()) is not None:
+            search, problem = SEARCHES[WITHOUT_POLICY] if search.follows_policy else search, wider
     found = search.plan(problem)
     if not found.solved and not deadline.passed and attempts.take_up():
         found = joined(found, search.plan(problem))
@@ -212,16 +214,23 @@ class _Attempts:
         self.first = self._last = problem
 
     def widened(self, params: BoundsParams) -> Problem | None:
-        """The problem with further instructions, if a goal needs them; no policy knows these."""
-        problem = self.first
+        """The problem with further instructions, if a goal needs them and there is time to tell."""
+        problem, scene = self.first, None
         if self._last is not problem:
             return self._last
-        scene = widened_scene(problem.scene, problem.objective, params, problem.deadline)
+        with suppress(OutOfTimeError):
+            scene = widened_scene(problem.scene, problem.objective, params, problem.deadline)
         if scene is None:
             return None
         bounds = SceneBounds(scene, params, problem.deadline, problem.objective)
-        observed = ObservedBounds(bounds)
-        self._last = replace(problem, scene=scene, bounds=observed, parts=bounds, policy=Uniform())
+        knows = problem.policy and not missing_instructions(problem.policy, scene.symbols.domain)
+        self._last = replace(
+            problem,
+            scene=scene,
+            bounds=ObservedBounds(bounds),
+            parts=bounds,
+            policy=problem.policy if knows else Uniform(),
+        )
         return self._last
 
     def take_up(self) -> bool:

@@ -27,6 +27,8 @@ class Search:
     follows_policy: bool = False
     over_sequences: bool = True
     """Whether it keeps sequences apart that lead to one state, and may begin with a given one."""
+    widens: bool = False
+    """Whether it asks for further instructions itself, and only where the policy has failed."""
 
     def plan(self, problem: "Problem") -> "SearchResult":
         """Search for a plan."""
@@ -37,7 +39,10 @@ class Search:
 
 SEARCHES: Mapping[str, Search] = {
     "complete": Search(
-        "complete:plan", "guided first, best-first where that fails", follows_policy=True
+        "complete:plan",
+        "guided first, best-first where that fails",
+        follows_policy=True,
+        widens=True,
     ),
     "guided": Search("guided:plan", "follow the policy, as in the paper", follows_policy=True),
     "best-first": Search(
