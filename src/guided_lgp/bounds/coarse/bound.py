@@ -4,6 +4,7 @@ import time
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from guided_lgp.bounds.coarse.variants import Variant
 from guided_lgp.bounds.deadline import NEVER, Deadline
 from guided_lgp.bounds.goals import NO_TERMS, GoalTerms
 from guided_lgp.bounds.program.geometry import SceneGeometry
-from guided_lgp.bounds.results import Array, CoarseResult, Failure
+from guided_lgp.bounds.results import Array, CoarseResult, Failure, Keyframe
 from guided_lgp.bounds.terms.term import UngraspableError
 from guided_lgp.bounds.verify import verify_keyframes
 from guided_lgp.logic import Skeleton, format_skeleton
@@ -176,11 +177,9 @@ class CoarseBound:
             warm_start=None if kept is None else kept.values,
         )
         solution = self._solver.solve(formulation.program, start, self._settings)
-        verified = 0
-        if kept is not None and kept.values is not None:
-            same = np.array_equal(solution.values[: len(kept.values)], kept.values)
-            verified = len(programs.skeleton) - 1 if same else 0
-        result = self._check(programs, formulation, solution, number + 1, verified)
+        if kept is not None and not _begins_with(solution.values, kept.values):
+            kept = None
+        result = self._check(programs, formulation, solution, number + 1, kept)
         return replace(result, variant=variant)
 
     def _check(
@@ -189,17 +188,15 @@ class CoarseBound:
         formulation: Formulation,
         solution: Solution,
         restarts: int,
-        verified: int,
+        prefix: CoarseSolution | None,
     ) -> CoarseSolution:
-        """Decode a solution and verify it, from the first action on that is not verified yet."""
+        """Decode a solution and verify it; a prefix has been, where it is the same."""
         skeleton = programs.skeleton
         if not solution.converged(self._settings):
             failure = self._decoder.failure(formulation, solution, self._settings.slack)
             return CoarseSolution(skeleton, feasible=False, failure=failure, restarts=restarts)
-        at_switch = self._decoder.keyframes(formulation, formulation.at_switch, solution.values)
-        after_action = self._decoder.keyframes(
-            formulation, formulation.after_action, solution.values
-        )
+        at_switch, after_action = self._keyframes(formulation, solution, prefix)
+        verified = 0 if prefix is None else len(prefix.skeleton)
         found = verify_keyframes(self._world, skeleton, at_switch, after_action, verified)
         if found is None:
             missed = programs.goals.faults(self.scene, after_action[-1].boxes)
@@ -216,12 +213,29 @@ class CoarseBound:
             values=solution.values[: formulation.program.variables],
         )
 
+    def _keyframes(
+        self, formulation: Formulation, solution: Solution, prefix: CoarseSolution | None
+    ) -> tuple[tuple[Keyframe, ...], tuple[Keyframe, ...]]:
+        """At each switch and after each action; those of the prefix are there already."""
+        at_switch, after = formulation.at_switch, formulation.after_action
+        decode = partial(self._decoder.keyframes, formulation, values=solution.values)
+        if prefix is None:
+            return decode(at_switch), decode(after)
+        return (*prefix.at_switch, *decode(at_switch[-1:])), (
+            *prefix.after_action,
+            *decode(after[-1:]),
+        )
+
 
 _PROVED = "proved for the arm alone, collisions left out"
 """What was tried where a fact says no."""
 
 _NOISE = 0.3
 """Spread of the choices in all starts but the first."""
+
+
+def _begins_with(values: Array, prefix: Array | None) -> bool:
+    return prefix is not None and np.array_equal(values[: len(prefix)], prefix)
 
 
 def _generator(skeleton: Skeleton, number: int) -> np.random.Generator:

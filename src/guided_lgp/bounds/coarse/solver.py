@@ -66,7 +66,7 @@ class Solver(Protocol):
     def reach(self, chain: str, arguments: Array) -> Array:
         """Closed-form inverse kinematics of a chain.
 
-        Arguments (count, 15) to joints and what is missing (count, n + 1), see
+        Arguments (count, 20) to joints and a cost (count, n + 1), see
         :func:`guided_lgp.bounds.program.inverse.closed_form`.
         """
         ...

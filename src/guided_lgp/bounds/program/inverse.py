@@ -4,7 +4,7 @@ Arms built like a human's are solved by formulas of their own, as compiled code;
 general inverse kinematics.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cache
 from typing import Any, Protocol
 
@@ -19,8 +19,16 @@ from guided_lgp.bounds.results import Array
 from guided_lgp.robots import Robot
 from guided_lgp.robots.inverse import inverse_kinematics
 
-INPUTS = 16
+_SHOULDER_JOINTS = 4
+"""The joints that move most of the arm; the wrist turns at no cost."""
+INPUTS = 16 + _SHOULDER_JOINTS
 """Arguments of a closed form, see :func:`_closed_form`."""
+_MISSING = 20.0
+"""Cost per m that is missing to reach: 5 cm, about a hand's way out of reach, cost 1."""
+_BEYOND = 5.0
+"""Cost per rad beyond joint limits: they can be mended by turning the hand about the box."""
+_MOTION = 0.05
+"""Cost per rad^2 of shoulder and elbow from the arm's side: only among what is reached."""
 _PANS = np.linspace(-0.55, 1.6, 10)
 """Values (rad) of the shoulder's pan that are tried, left arm: from the middle to its own side."""
 _VALUES = 6
@@ -28,7 +36,7 @@ _VALUES = 6
 _TURN = 2 * np.pi
 
 Evaluate = Callable[[str, Array], Array]
-"""Runs the closed form of a chain: its name and arguments (count, 16) to (count, n + 1)."""
+"""Runs the closed form of a chain: its name and arguments (count, 20) to (count, n + 1)."""
 
 
 class Reach(Protocol):
@@ -47,8 +55,8 @@ class Reach(Protocol):
             ends: (E, 2) back along the approach and up (m); the first is the contact.
 
         Returns:
-            joints (N, M, E, candidates, n), perhaps beyond limits, and missing (N, M, E,
-            candidates), how far (m) the tool is from its target. One candidate is one motion.
+            joints (N, M, E, candidates, n) within their limits, and costs (N, M, E, candidates) of
+            what is missing, of limits, and of the way. One candidate is one motion.
         """
         ...
 
@@ -57,9 +65,13 @@ class ClosedForm:
     """By the formulas of a human-like arm, for several pans and both elbows."""
 
     def __init__(self, arm: ArmKinematics, lifted: float, evaluate: Evaluate) -> None:
-        self._arm = arm
-        self._lifted = lifted
+        self._chain = arm.chain.name
         self._evaluate = evaluate
+        self._candidates = np.zeros((2 * len(_PANS), INPUTS))
+        self._candidates[:, 7] = np.tile(_PANS, 2)
+        self._candidates[:, 8] = np.repeat([1.0, -1.0], len(_PANS))
+        self._candidates[:, 9:11] = arm.side, lifted
+        self._candidates[:, 16:] = arm.home[:_SHOULDER_JOINTS]
 
     def __call__(
         self, held: HeldBox, hand: Hand, poses: Array, pitches: Array, ends: Array
@@ -67,18 +79,15 @@ class ClosedForm:
         """See :class:`Reach`."""
         shape = (len(poses), len(pitches), len(ends), 2 * len(_PANS))
         arguments = np.empty((*shape, INPUTS))
+        arguments[...] = self._candidates
         arguments[..., :4] = poses[:, None, None, None]
         arguments[..., 4] = pitches[:, None, None]
         arguments[..., 5:7] = hand
-        arguments[..., 7] = np.tile(_PANS, 2)
-        arguments[..., 8] = np.repeat([1.0, -1.0], len(_PANS))
-        arguments[..., 9] = self._arm.side
-        arguments[..., 10] = self._lifted
         arguments[..., 11] = ends[:, 1, None]
         side = held.side
         arguments[..., 12:15] = side.half_length, held.half_height, side.turn
         arguments[..., 15] = ends[:, 0, None]
-        found = self._evaluate(self._arm.chain.name, arguments.reshape(-1, INPUTS))
+        found = self._evaluate(self._chain, arguments.reshape(-1, INPUTS))
         solutions = found.reshape(*shape, -1)
         return solutions[..., :-1], solutions[..., -1]
 
@@ -87,7 +96,8 @@ class General:
     """By the general inverse kinematics, for several values of a redundant joint."""
 
     def __init__(self, robot: Robot, arm: ArmKinematics, fixed: tuple[float, ...]) -> None:
-        self._arm = arm.arm
+        self._arm, self._home = arm.arm, arm.home
+        self._limits = np.array(arm.limits).T
         self._low, self._high = arm.arm.limits.T
         joints = (joint.joint for joint in robot.fixed_joints.values())
         values = dict(zip(joints, fixed, strict=True))
@@ -108,7 +118,10 @@ class General:
         joints, lost = self._followed(q, missing)
         candidates = (*joints.shape[:3], -1)
         joints = self._arm.signs * joints  # in the convention of the chain
-        return joints.reshape(*candidates, joints.shape[-1]), lost.reshape(candidates)
+        within = np.clip(joints, *self._limits)
+        values, limited = (np.moveaxis(array, -1, 0) for array in (joints, within))
+        costs = _cost(values, limited, lost, self._home[:_SHOULDER_JOINTS])
+        return within.reshape(*candidates, joints.shape[-1]), costs.reshape(candidates)
 
     def _followed(self, q: Array, missing: Array) -> tuple[Array, Array]:
         """For every branch at the contact, the nearest one at each end.
@@ -160,21 +173,33 @@ def _lifted(chain: Chain, fixed: tuple[float, ...]) -> float:
 def closed_forms(kinematics: RobotKinematics) -> dict[str, Any]:
     """The closed forms of those chains of a robot that have one, by the chain's name."""
     return {
-        chain.name: _closed_form(chain, lengths)
-        for chain in kinematics.chains
-        if (lengths := human_like(chain)) is not None
+        arm.chain.name: _closed_form(arm, lengths)
+        for arm in reversed(kinematics.arms.values())
+        if (lengths := human_like(arm.chain)) is not None
     }
 
 
-def _closed_form(chain: Chain, lengths: HumanLike) -> Any:
+def _cost(joints: Iterable[Any], within: Iterable[Any], missing: Any, home: Iterable[Any]) -> Any:
+    """Of values of joints, their values within the limits, and what is missing to reach (m)."""
+    joints = list(joints)
+    beyond = sum(abs(value - limited) for value, limited in zip(joints, within, strict=True))
+    motion = sum((value - side) ** 2 for value, side in zip(joints, home, strict=False))
+    return _BEYOND * beyond + _MISSING * missing + _MOTION * motion
+
+
+def _closed_form(arm: ArmKinematics, lengths: HumanLike) -> Any:
     """CasADi function of one closed-form inverse kinematics.
 
     Inputs (16,): pose (x, y, yaw) and height of the box; pitch, offset, depth; shoulder pan,
     branch, side; lift of the shoulder; lift above the box's place; half length, half height, turn,
-    distance back.
-    Outputs (8,): joint values (mirrored for a mirror image) and the distance missing to reach (m).
+    distance back; the first joints at the arm's side.
+    Outputs (8,): joint values within their limits (mirrored for a mirror image) and the cost.
     """
     x = ca.SX.sym("x", INPUTS)
-    position, rotation = tool_target(x[:3], x[3] + x[11], x[4:7], x[12:16], chain.palm_front)
+    position, rotation = tool_target(x[:3], x[3] + x[11], x[4:7], x[12:16], arm.chain.palm_front)
     solution = inverse(lengths, position, rotation, x[7], x[8], x[9], x[10])
-    return ca.Function(f"reach_{chain.name}", [x], [solution])
+    joints, (low, high) = solution[:-1], np.array(arm.limits).T
+    within = ca.fmin(ca.fmax(joints, low), high)
+    values, limited = (ca.vertsplit(part) for part in (joints, within))
+    cost = _cost(values, limited, solution[-1], ca.vertsplit(x[16:]))
+    return ca.Function(f"reach_{arm.chain.name}", [x], [ca.vertcat(within, cost)])

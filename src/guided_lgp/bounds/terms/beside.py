@@ -34,12 +34,12 @@ class Separation:
     def start(self, draft: Draft) -> None:
         """The best direction along an axis of the boxes."""
         if self.angle >= draft.kept:
-            poses = draft.pose(self.first), draft.pose(self.second)
-            draft.values[self.angle] = _separation(*poses, self.halves)[1]
+            poses = draft.pose(self.first)[None], draft.pose(self.second)
+            draft.values[self.angle] = _separation(*poses, self.halves)[1][0]
 
-    def overlap(self, draft: Draft, first: Array) -> float:
-        """How much (m) the first box, if it stood there, would overlap the second."""
-        return max(0.0, -_separation(first, draft.pose(self.second), self.halves)[0])
+    def overlap(self, draft: Draft, first: Array) -> Array:
+        """How much (n,) in m the first box, if it stood there (n, 4), would overlap the second."""
+        return np.maximum(0.0, -_separation(first, draft.pose(self.second), self.halves)[0])
 
 
 def _kernels(robot: RobotKinematics) -> tuple[Kernel, ...]:
@@ -98,15 +98,19 @@ def _separate(context: Context, name: str, other: str) -> None:
 
 def _separation(
     first: Array, second: Array, halves: tuple[float, float, float, float]
-) -> tuple[float, float]:
-    """Largest distance (m) along the boxes' axes that separates them, and that direction (rad)."""
-    angles = np.concatenate([first[2] + _QUARTERS, second[2] + _QUARTERS])
-    normals = np.stack([np.cos(angles), np.sin(angles)])
-    distance = (second[:2] - first[:2]) @ normals
-    for yaw, (hx, hy) in ((first[2], halves[:2]), (second[2], halves[2:])):
+) -> tuple[Array, Array]:
+    """Largest distance (m) along the boxes' axes that separates them, and that direction (rad).
+
+    Both (n,), for poses (n, 4) of the first box.
+    """
+    angles = np.empty((len(first), 8))
+    angles[:, :4], angles[:, 4:] = first[:, 2:3] + _QUARTERS, second[2] + _QUARTERS
+    x, y = (second[:2] - first[:, :2]).T[..., None]
+    distance = x * np.cos(angles) + y * np.sin(angles)
+    for yaw, (hx, hy) in ((first[:, 2:3], halves[:2]), (second[2], halves[2:])):
         distance = distance - hx * np.abs(np.cos(angles - yaw)) - hy * np.abs(np.sin(angles - yaw))
-    best = int(np.argmax(distance))
-    return float(distance[best]), float(angles[best])
+    best = np.arange(len(first)), np.argmax(distance, axis=1)
+    return distance[best], angles[best]
 
 
 _QUARTERS = np.arange(4) * np.pi / 2

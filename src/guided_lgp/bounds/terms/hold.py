@@ -249,29 +249,16 @@ def _solutions(
     Returns:
         joints (poses, pitches, 1 + segments, candidates, n) and costs (poses, pitches, candidates).
     """
-    arm = draft.robot.arms[held.gripper]
     ends = np.array([(0.0, 0.0), *((segment.back, segment.up) for segment in segments)])
     offset, depth = draft.values[[held.offset, held.depth]].tolist()
-    joints, missing = draft.reach[held.gripper](held, (offset, depth), poses, tried, ends)
-    low, high = np.array(arm.limits).T
-    beyond = np.maximum(low - joints, 0) + np.maximum(joints - high, 0)
-    motion = ((joints - arm.home) ** 2)[..., :_SHOULDER_JOINTS].sum(axis=-1)
-    costs = _BEYOND * beyond.sum(axis=-1) + _MISSING * missing + _MOTION * motion
-    return np.clip(joints, low, high), costs.sum(axis=2)
+    joints, costs = draft.reach[held.gripper](held, (offset, depth), poses, tried, ends)
+    return joints, costs.sum(axis=2)
 
 
 _PITCHES = np.pi * np.array([0.2, 0.35, 0.5, 0.65, 0.8])
 """Pitches (rad) of the approach that are tried, from one end of the box over the top."""
 _PITCH_SPREAD = 0.4
 """How far (rad) they are moved in a start with noise: to the middle between two."""
-_MISSING = 20.0
-"""Cost per m that is missing to reach: 5 cm, about a hand's way out of reach, cost 1."""
-_BEYOND = 5.0
-"""Cost per rad beyond joint limits: they can be mended by turning the hand about the box."""
-_MOTION = 0.05
-"""Cost per rad^2 of shoulder and elbow from the arm's side: only among what is reached."""
-_SHOULDER_JOINTS = 4
-"""The joints that move most of the arm; the wrist turns at no cost."""
 
 
 # check

@@ -77,7 +77,7 @@ class Placement:
         total = np.zeros(len(candidates))
         for other in self.others:
             if isinstance(other, Separation) and other.first is self.pose:
-                total += np.array([other.overlap(draft, candidate) for candidate in candidates])
+                total += other.overlap(draft, candidates)
         return _OVERLAP * total
 
     def _segments(self, draft: Draft) -> tuple[StraightSegment, ...]:
