@@ -163,7 +163,10 @@ class CoarseBound:
     def _restart(
         self, programs: Programs, number: int, prefix: CoarseSolution | None
     ) -> CoarseSolution:
-        """One start: the first and every other one keep the solution of the prefix."""
+        """One start: the first and every other one keep the solution of the prefix.
+
+        The first one leaves the prefix where it is, if it can: then it need not be verified again.
+        """
         self._deadline.check()
         kept = prefix if number == 0 or number % 2 else None
         generator = _generator(programs.skeleton, number)
@@ -176,17 +179,25 @@ class CoarseBound:
             noise=0.0 if number == 0 else _NOISE,
             warm_start=None if kept is None else kept.values,
         )
+        check = partial(self._check, programs, formulation, restarts=number + 1)
+        if kept is not None and kept.values is not None and number == 0:
+            still = formulation.program.holding(kept.values)
+            solution = self._solver.solve(still, start, _BRIEF)
+            if solution.converged(_BRIEF):
+                result = check(solution, prefix=kept)
+                if result.feasible:
+                    return replace(result, variant=variant)
         solution = self._solver.solve(formulation.program, start, self._settings)
         if kept is not None and not _begins_with(solution.values, kept.values):
             kept = None
-        result = self._check(programs, formulation, solution, number + 1, kept)
-        return replace(result, variant=variant)
+        return replace(check(solution, prefix=kept), variant=variant)
 
     def _check(
         self,
         programs: Programs,
         formulation: Formulation,
         solution: Solution,
+        *,
         restarts: int,
         prefix: CoarseSolution | None,
     ) -> CoarseSolution:
@@ -229,6 +240,9 @@ class CoarseBound:
 
 _PROVED = "proved for the arm alone, collisions left out"
 """What was tried where a fact says no."""
+
+_BRIEF = Settings(steps=50, patience=15)
+"""While the prefix stays where it is, there is little to do."""
 
 _NOISE = 0.3
 """Spread of the choices in all starts but the first."""

@@ -3,7 +3,7 @@
 from array import array
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +38,13 @@ class Program:
     lower: Array
     upper: Array
     order: Integers
+
+    def holding(self, values: Array) -> "Program":
+        """With the first variables at values where they stay."""
+        count = len(values)
+        lower = np.concatenate([values, self.lower[count:]])
+        upper = np.concatenate([values, self.upper[count:]])
+        return replace(self, lower=lower, upper=upper)
 
     @property
     def variables(self) -> int:
