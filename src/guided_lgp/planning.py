@@ -58,6 +58,9 @@ SEQUENCES_PER_ACTION = 100
 """Sequences that a search may hand to the coarse bound, beyond the limit of the experiments, for
 each action that a task needs at least."""
 
+_NO_POSTURE = ("no motion found to the posture at the end", "another posture")
+"""What is found, and what would help, where arms cannot go where goals want them."""
+
 logger = logging.getLogger(__name__)
 
 _OUTCOMES: Mapping[Cause, str] = {
@@ -166,12 +169,15 @@ def plan(
         check_objective(goals, scene.symbols)
         check_places(goals, scene)
     misplaced = _misplaced(scene, goals)
+    params = params or load_planning()
     if not prefix and satisfied(scene.state, goals) and not misplaced:
-        return _without_search(scene, goals, stay(scene))
+        rest = _at_rest(scene, goals, params, deadline)
+        if not rest.feasible:
+            return _without_search(scene, goals, None, Finding("posture", *_NO_POSTURE))
+        return _without_search(scene, goals, rest)
     if (prefix or misplaced) and not SEARCHES[planner].over_sequences:
         accepted = ", ".join(name for name, search in SEARCHES.items() if search.over_sequences)
         raise InputError("planner", f"{planner} knows neither sequences nor places", accepted)
-    params = params or load_planning()
     scene_bounds = SceneBounds(scene, params.bounds, deadline, goals)
     if finding := TaskFacts(scene_bounds, goals, misplaced).before_search():
         return _without_search(scene, goals, None, finding)
@@ -199,6 +205,15 @@ def plan(
     if not found.solved and not deadline.passed and attempts.take_up():
         found = joined(found, search.plan(problem))
     return attempts.result(found)
+
+
+def _at_rest(
+    scene: Scene, goals: Objective, params: PlanningParams, deadline: Deadline
+) -> PathResult:
+    """The plan of no actions, in which arms may still have to go where goals want them."""
+    if not GoalTerms.of(goals, scene.symbols.domain).ends:
+        return stay(scene)
+    return SceneBounds(scene, params.bounds, deadline, goals).rest()
 
 
 def _only_timed(problem: Problem) -> SearchResult:

@@ -116,3 +116,12 @@ def test_lower_bounds(goals: list[str]) -> None:
 def test_a_hand_that_shall_be_empty_takes_an_action() -> None:
     both = DOMAIN.state({}, {"red": "pr2L", "green": "pr2R"})
     assert least_actions(both, parse_objective(["(handempty)"]), SYMBOLS) == 2
+
+
+def test_a_posture_is_no_place() -> None:
+    objective = parse_objective(["(posture pr2L 0 0.5 -1)"])
+    assert satisfied(START, objective)
+    assert not asks_for_places(objective, SYMBOLS)
+    assert encodable(objective, SYMBOLS) == ()
+    (term,) = DOMAIN.final_terms(objective[0])
+    assert (term.symbols, term.options) == (("pr2L",), {"joint1": 0, "joint2": 0.5, "joint3": -1})

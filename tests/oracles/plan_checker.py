@@ -84,6 +84,7 @@ class Keyframe(NamedTuple):
 class Hand(NamedTuple):
     """What the robot file says of a gripper."""
 
+    joints: list[str]  # of its arm, from the shoulder on
     tool: str  # link
     frame: np.ndarray  # (4, 4) of the tool frame in it: x out of the palm, fingers close along y
     links: list[str]  # the palm first
@@ -165,13 +166,14 @@ GOALS = {
     "at": (6, 7, 8),  # box, table, x, y, z, yaw and, if not the usual ones, tolerances in m and rad
     "in": (6,),  # box, table, two corners of a rectangle in the frame of its top
     "upright": (1,),
+    "posture": range(2, 20),  # gripper, and a value for every joint of its arm
 }
 ACTIONS = {"grasp": (2,), "place": (3,), "take": (3,)}
 NEAR, TURNED = 0.01, 0.05  # the usual tolerances of a goal's pose
 EDGE = 5e-4  # a corner may be outside a goal's region by this much
 
 
-def _atom(text: str, arities: Mapping[str, tuple[int, ...]]) -> tuple[str, ...]:
+def _atom(text: str, arities: Mapping[str, Sequence[int]]) -> tuple[str, ...]:
     found = re.fullmatch(r"\((\w+)((?: \S+)*)\)", text)
     words = (found[1], *found[2].split()) if found else ("",)
     if len(words) - 1 not in arities.get(words[0], ()):
@@ -271,7 +273,13 @@ def _hand(arm: Mapping[str, Any]) -> Hand:
     x, y = AXES[tool["approach"]], AXES[tool["closing"]]
     frame[:3, :3] = np.column_stack([x, y, np.cross(x, y)])
     frame[:3, 3] = tool.get("offset", (0, 0, 0))
-    return Hand(tool["link"], frame, arm["hand_links"], arm.get("fingers", {}).get("joints", []))
+    return Hand(
+        arm["joints"],
+        tool["link"],
+        frame,
+        arm["hand_links"],
+        arm.get("fingers", {}).get("joints", []),
+    )
 
 
 def _merged(attachments: Iterable[Attachment]) -> list[Attachment]:
@@ -531,7 +539,15 @@ def _achieved(plan: Plan, state: State, motion: Motion, goal: tuple[str, ...]) -
             return state.support.get(box) == table and inside
         case "upright", box:  # at rest it is level anyway, so that all of the way counts
             return box in motion.boxes and _stays_level(plan, motion, box)
+        case "posture", gripper, *numbers:
+            return gripper in plan.hands and _ends_at(plan, gripper, list(map(float, numbers)))
     return False
+
+
+def _ends_at(plan: Plan, gripper: str, values: list[float]) -> bool:
+    joints = plan.hands[gripper].joints
+    last = [plan.q[-1][plan.joints.index(joint)] for joint in joints]
+    return len(values) == len(last) and np.allclose(last, values, rtol=0, atol=ROUNDING)
 
 
 def _is_at(pose: np.ndarray, numbers: list[float]) -> bool:

@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from guided_lgp.bounds.checks import Pose, Violation, box_sizes, top_of
 from guided_lgp.bounds.results import Array
 from guided_lgp.bounds.terms import find_term
@@ -16,22 +18,34 @@ class GoalTerms:
     """The terms of an objective; an objective of symbols alone has none."""
 
     final: tuple[GroundTerm, ...] = ()
-    """At the end."""
+    """On bodies, at the end."""
     lasting: tuple[GroundTerm, ...] = ()
     """All the time."""
+    postures: tuple[GroundTerm, ...] = ()
+    """On arms, at the end."""
 
     @classmethod
     def of(cls, objective: Objective, domain: Domain) -> "GoalTerms":
         """The terms of all goals."""
+        final = [term for goal in objective for term in domain.final_terms(goal)]
         return cls(
-            tuple(term for goal in objective for term in domain.final_terms(goal)),
+            tuple(term for term in final if term.name != "posture"),
             tuple(term for goal in objective for term in domain.lasting_terms(goal)),
+            tuple(term for term in final if term.name == "posture"),
         )
 
     @property
     def upright(self) -> frozenset[str]:
         """The boxes that stay level on their way."""
         return frozenset(term.symbols[0] for term in self.lasting if term.name == "upright")
+
+    @property
+    def ends(self) -> dict[str, Array]:
+        """The joints (n,) at which arms end, by gripper."""
+        return {
+            term.symbols[0]: np.array([float(value) for value in term.options.values()])
+            for term in self.postures
+        }
 
     def about(self, box: str) -> "GoalTerms":
         """Those at the end that are about one box."""

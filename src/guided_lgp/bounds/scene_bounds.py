@@ -94,6 +94,10 @@ class SceneBounds:
             self._path[skeleton] = result
         return result
 
+    def rest(self) -> PathResult:
+        """The motion of a plan without actions."""
+        return self._path_bound.rest()
+
     @cached_property
     def _path_bound(self) -> PathBound:
         """Built when first asked: most skeletons never get so far."""

@@ -44,8 +44,8 @@ def plan(
             metavar="GOAL",
             help='What must hold at the end: "(on BOX TABLE)", where TABLE may be another box, '
             '"(held BOX)", "(heldby BOX GRIPPER)", "(empty GRIPPER)", "(handempty)", "(at BOX X Y '
-            'Z YAW)", "(in BOX TABLE X0 Y0 X1 Y1)", a region of the top, or "(upright BOX)" on the '
-            "way. Once for each goal.",
+            'Z YAW)", "(in BOX TABLE X0 Y0 X1 Y1)", a region of the top, "(posture GRIPPER JOINT '
+            '...)", where the arm ends, or "(upright BOX)" on the way. Once for each goal.',
             show_default="none: only with --skeleton",
         ),
     ] = [],  # noqa: B006

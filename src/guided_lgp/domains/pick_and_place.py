@@ -26,7 +26,7 @@ g, b, t = Gripper("gripper"), Box("box"), Table("table")
 
 pads, hold, beside = terms("pads hold beside")
 stand, balanced, present = terms("stand balanced present")
-at, within, upright = terms("at within upright")
+at, within, upright, posture = terms("at within upright posture")
 transit, line_in, switch, line_out, home = terms("transit line_in switch line_out home")
 
 grasp = Instruction(
@@ -79,5 +79,6 @@ DOMAIN = Domain(
         ),
         GoalType("in", (b, t), (on(b, t),), numbers=numbers("x0 y0 x1 y1"), final=(within(b, t),)),
         GoalType("upright", (b,), lasting=(upright(b),)),
+        GoalType("posture", (g,), series="joint", final=(posture(g),)),
     ),
 )

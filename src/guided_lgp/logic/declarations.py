@@ -188,13 +188,16 @@ class GoalType:
     """A kind of goal: what must be true of its parameters, and where it leaves a body.
 
     Numbers follow the parameters in a goal's text. ``final`` are the terms that hold at the end of
-    a plan, ``lasting`` those that hold all the time; a term has the numbers as options.
+    a plan, ``lasting`` those that hold all the time; a term has the numbers as options,
+    those of a series called ``joint`` as ``joint1``, ``joint2``, ...
     """
 
     name: str
     parameters: tuple[Variable, ...]
     condition: tuple[Atom, ...] = ()
     numbers: tuple[Number, ...] = ()
+    series: str = ""
+    """The name of further numbers, one or more: their count depends on a symbol."""
     final: tuple[Term, ...] = ()
     lasting: tuple[Term, ...] = ()
     derived: Variable | None = None

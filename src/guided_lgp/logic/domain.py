@@ -181,6 +181,7 @@ def _signature(declared: Instruction | GoalType) -> str:
     if isinstance(declared, GoalType):
         words = [f"[{word}]" if _is_derived(declared, word) else word for word in words]
         words += [n.name if n.default is None else f"[{n.name}]" for n in declared.numbers]
+        words += [f"{declared.series} ..."] if declared.series else []
     return f"({' '.join((declared.name, *words))})"
 
 
@@ -193,6 +194,8 @@ def _fits(declared: Instruction | GoalType, symbols: tuple[str, ...]) -> bool:
     if isinstance(declared, Instruction):
         return beyond == 0
     required = sum(number.default is None for number in declared.numbers)
+    if declared.series:
+        return beyond > len(declared.numbers)
     return required <= beyond <= len(declared.numbers)
 
 
@@ -233,6 +236,9 @@ def _goal_terms(domain: Domain, goal: Goal, terms: tuple[Term, ...]) -> tuple[Gr
 def _numbers(goal: Goal, goal_type: GoalType) -> dict[str, float]:
     given = goal.symbols[len(goal_type.parameters) :]
     values = {number.name: number.default for number in goal_type.numbers}
+    if goal_type.series:
+        beyond = len(given) - len(values)
+        values |= {f"{goal_type.series}{place + 1}": None for place in range(beyond)}
     for name, text in zip(values, given, strict=False):
         try:
             values[name] = float(text)

@@ -19,9 +19,12 @@ def complete_objective(objective: Objective, scene: Scene) -> Objective:
     """The objective with what its goals may leave out: the support on which a pose stands.
 
     Raises:
-        InputError: a number cannot be read or is out of range, or nothing is below a pose.
+        InputError: a number cannot be read or is out of range, nothing is below a pose, or an arm
+            has other joints than a posture, or more than one posture.
     """
-    return tuple(dict.fromkeys(_complete(goal, scene) for goal in objective))
+    complete = tuple(dict.fromkeys(_complete(goal, scene) for goal in objective))
+    _check_postures(complete, scene)
+    return complete
 
 
 def in_the_way(body: str, objective: Objective, scene: Scene) -> frozenset[str]:
@@ -92,6 +95,27 @@ def _stands(body: Box, support: Table | Box, numbers: Mapping[str, str | float])
 def _heights(body: Box, scene: Scene) -> Iterator[tuple[str, float]]:
     for support in scene.supports:
         yield support.name, support.top[2] + body.size[2] / 2
+
+
+def _check_postures(objective: Objective, scene: Scene) -> None:
+    """Joint values are those of an arm, and within its limits; each arm ends in one posture."""
+    arms, postures = scene.robot.description.arms, dict[str, Goal]()
+    for goal in objective:
+        for term in scene.symbols.domain.final_terms(goal):
+            arm = arms.get(term.symbols[0])
+            if term.name != "posture" or arm is None:
+                continue
+            if postures.setdefault(arm.gripper, goal) != goal:
+                raise InputError("objective", f"{arm.gripper} is to end in two postures")
+            if len(term.options) != len(arm.joints):
+                fault = f"{len(term.options)} values for {len(arm.joints)} joints"
+                raise InputError(f"goal {goal}", fault, ", ".join(arm.joints))
+            for joint, value, (low, high) in zip(
+                arm.joints, term.options.values(), arm.limits, strict=True
+            ):
+                if not low <= float(value) <= high:
+                    accepted = f"{low:.3f} to {high:.3f}"
+                    raise InputError(f"goal {goal}", f"{joint} is {value}", accepted)
 
 
 def _check_numbers(goal: Goal, numbers: Mapping[str, str | float]) -> None:

@@ -32,7 +32,7 @@ from guided_lgp.scene.footprints import footprint, gap, inner_radius, inset, sea
 from guided_lgp.scene.tolerances import MARGIN
 from guided_lgp.search.conflicts import Conflicts
 
-Kind = Literal["width", "reach", "room", "way", "blocked", "part"]
+Kind = Literal["width", "reach", "room", "way", "blocked", "part", "posture"]
 
 KINDS: dict[Kind, str] = {
     "width": "too wide for the fingers",
@@ -41,6 +41,7 @@ KINDS: dict[Kind, str] = {
     "way": "no arm for the whole way",
     "blocked": "neighbours in the way",
     "part": "no solution even alone",
+    "posture": "no motion found to the posture",
 }
 """What may be found, in the words of the glossary."""
 

@@ -1,20 +1,22 @@
 """The path bound P(a_1:K): the dense motion for a whole skeleton (paper, eq. 4)."""
 
 import time
+from collections.abc import Sequence
 from itertools import chain, islice
 
 from guided_lgp.bounds.coarse import CoarseBound
 from guided_lgp.bounds.deadline import NEVER, Deadline
 from guided_lgp.bounds.goals import NO_TERMS, GoalTerms
-from guided_lgp.bounds.path.assembly import assemble
+from guided_lgp.bounds.path.assembly import assemble, stay
 from guided_lgp.bounds.path.grips import grips_of
 from guided_lgp.bounds.path.motions import Mover
 from guided_lgp.bounds.path.optimise import optimise
 from guided_lgp.bounds.path.sampler import OutcomeSampler
-from guided_lgp.bounds.path.situation import Situation
+from guided_lgp.bounds.path.situation import Situation, Step
 from guided_lgp.bounds.path.task import FurthestFailure, Outcome, Stage, Task
-from guided_lgp.bounds.results import CoarseResult, Failure, PathResult
-from guided_lgp.bounds.verify import verify_path
+from guided_lgp.bounds.results import CoarseResult, Failure, PathResult, Trajectory
+from guided_lgp.bounds.verify import PathReport, verify_path
+from guided_lgp.logic import Skeleton
 from guided_lgp.scene import Scene
 from guided_lgp.scene.world import world_of
 
@@ -101,12 +103,12 @@ class PathBound:
             outcomes = self._search(task, OutcomeSampler(task), limit, 0, situation)
             if not isinstance(outcomes, list):
                 continue
-            steps = [*first, *(step for outcome in outcomes for step in outcome.steps)]
-            for chosen in (optimise(self._mover, steps), steps):
-                trajectory = assemble(self._mover.robot, task.start, chosen)
-                report = verify_path(self._world, skeleton, trajectory, self._goals)
-                if report.violation is None:
-                    break
+            arrived = task.arrived(outcomes[-1].situation)
+            if arrived is None:
+                continue
+            done = (step for outcome in outcomes for step in outcome.steps)
+            steps = [*first, *done, *arrived[0]]
+            trajectory, report = self._verified(task, skeleton, steps)
             if report.violation is not None:
                 fault = report.violation
                 furthest.record(fault.action, Stage.VERIFICATION, fault.constraint)
@@ -135,6 +137,34 @@ class PathBound:
             failure=failure,
             time_s=time.perf_counter() - began,
         )
+
+    def rest(self) -> PathResult:
+        """The plan of no actions: arms go where goals want them."""
+        furthest = FurthestFailure()
+        task = Task(self._scene, self._mover, self._grips, (), (), furthest, 0, self._goals)
+        arrived = task.arrived(task.start)
+        if arrived is None:
+            failure = Failure(0, furthest.constraint, float("nan"), "this motion alone")
+            return PathResult((), feasible=False, failure=failure)
+        if not arrived[0]:
+            return stay(self._scene)
+        trajectory, report = self._verified(task, (), arrived[0])
+        if report.violation is not None:
+            fault = report.violation
+            failure = Failure(0, fault.constraint, fault.amount, "verification")
+            return PathResult((), feasible=False, failure=failure)
+        return PathResult((), feasible=True, trajectory=trajectory, steps=tuple(arrived[0]))
+
+    def _verified(
+        self, task: Task, skeleton: Skeleton, steps: Sequence[Step]
+    ) -> tuple[Trajectory, PathReport]:
+        """The motion of all steps, optimised if it is still good then."""
+        for chosen in (optimise(self._mover, steps), steps):
+            trajectory = assemble(self._mover.robot, task.start, chosen)
+            report = verify_path(self._world, skeleton, trajectory, self._goals)
+            if report.violation is None:
+                break
+        return trajectory, report
 
     def _search(
         self, task: Task, sampler: OutcomeSampler, limit: int, index: int, situation: Situation

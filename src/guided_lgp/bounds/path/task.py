@@ -1,6 +1,6 @@
 """What all ways to carry out the actions of a skeleton share, and the arm's reach at a contact."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from itertools import permutations
@@ -46,7 +46,9 @@ class Stage(IntEnum):
     HOME = 8
     ASIDE = 9
     """An arm that nobody needs any more goes home."""
-    VERIFICATION = 10
+    END = 10
+    """Arms go where goals want them."""
+    VERIFICATION = 11
 
 
 @dataclass(frozen=True)
@@ -207,18 +209,43 @@ class Task:
         return self.transit(situation.around(gripper), now, arm.home, keep_level=False)
 
     def gathered(self) -> tuple[list[Motion], Situation] | None:
-        """All arms go to their side from where they start, in an order in which they can."""
-        for order in permutations(self.arms):
-            steps, situation = list[Motion](), self.start
+        """All arms go to their side from where they start."""
+        gathered = self._in_some_order(self.start, self.arms, self.home)
+        if gathered is None:
+            self.record(0, Stage.START, "no way from the start to the arms' side")
+        return gathered
+
+    def arrived(self, situation: Situation) -> tuple[list[Motion], Situation] | None:
+        """Arms go where goals want them at the end."""
+        arrived = self._in_some_order(situation, self.goals.ends, self._to_end)
+        if arrived is None:
+            self.record(len(self) - 1, Stage.END, "no motion found to the posture at the end")
+        return arrived
+
+    def _to_end(self, situation: Situation, gripper: str) -> list[Motion] | None:
+        now, end = situation.q[self.arms[gripper].arm.slice], self.goals.ends[gripper]
+        if np.array_equal(now, end):
+            return []
+        loaded = situation.loaded(gripper)
+        return self.transit(situation.around(gripper), now, end, keep_level=loaded)
+
+    def _in_some_order(
+        self,
+        situation: Situation,
+        grippers: Iterable[str],
+        move: Callable[[Situation, str], list[Motion] | None],
+    ) -> tuple[list[Motion], Situation] | None:
+        """Arms move, one after the other, in an order in which they can."""
+        for order in permutations(grippers):
+            steps, now = list[Motion](), situation
             for gripper in order:
-                motions = self.home(situation, gripper)
+                motions = move(now, gripper)
                 if motions is None:
                     break
                 steps += motions
-                situation = self.after(situation, motions)
+                now = self.after(now, motions)
             else:
-                return steps, situation
-        self.record(0, Stage.START, "no way from the start to the arms' side")
+                return steps, now
         return None
 
     def after(self, situation: Situation, steps: Sequence[Step]) -> Situation:

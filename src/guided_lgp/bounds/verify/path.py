@@ -1,7 +1,8 @@
 """Verification of paths."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import chain, pairwise
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from guided_lgp.scene.world import World, initial_poses
 JUDGED = 10
 """PyBullet judges at least every so-many-th configuration: steps of at most 10 cm."""
 START = 1e-3
-"""How far (rad) the first configuration may be off the scene's."""
+"""How far (rad) the first configuration may be off the scene's, and the last off a goal's."""
 
 
 @dataclass(frozen=True)
@@ -96,10 +97,19 @@ def _walk(
             violation = replace(violation, action=min(index, len(skeleton) - 1))
             return PathReport(violation, collisions.checked, collisions.deepest)
         boxes = phase.boxes_at(-1)
-    missed = next(iter(goals.faults(world.scene, boxes)), None)
+    faults = goals.faults(world.scene, boxes)
+    missed = next(chain(faults, _postures_missed(world, goals, q[-1])), None)
     if missed is not None:
         missed = replace(missed, action=len(skeleton) - 1, time=float(times[-1]))
     return PathReport(missed, collisions.checked, collisions.deepest)
+
+
+def _postures_missed(world: World, goals: GoalTerms, q: Array) -> Iterator[Violation]:
+    """Arms that do not end where goals want them, at samples (m,) of all moving joints."""
+    for gripper, end in goals.ends.items():
+        away = float(np.abs(q[world.scene.robot.description.arms[gripper].slice] - end).max())
+        if away > START:
+            yield Violation(f"posture {gripper}", away)
 
 
 class _Collisions:
