@@ -73,6 +73,18 @@ def joint_efforts(scene: Scene, q: Array, times: Array, carried: Iterable[Carrie
     return efforts
 
 
+def own_weights(scene: Scene, q: Array) -> Array:
+    """Torques (T, n) in Nm of the arms' own weight at configurations q (T, n)."""
+    import pinocchio
+
+    kinematics = scene.robot.description.kinematics
+    model, data = _model(scene)
+    columns = [joint.velocity for joint in kinematics.joints]
+    full = kinematics.rows(q, scene.robot.fixed_values)
+    weights = [pinocchio.computeGeneralizedGravity(model, data, row)[columns] for row in full]
+    return np.array(weights)
+
+
 def derivatives(values: Array, times: Array) -> tuple[Array, Array]:
     """First and second derivatives (T - 2, n) at the inner rows of samples (T, n)."""
     steps = np.diff(times)[:, None]
@@ -91,9 +103,7 @@ def _torques(scene: Scene, q: Array, rate: Array, change: Array) -> Array:
     velocity, acceleration = np.zeros((2, model.nv))
     velocity[columns], acceleration[columns] = rate, change
     torques = pinocchio.rnea(model, data, full, velocity, acceleration)[columns]
-    if robot.balanced:
-        torques = torques - pinocchio.computeGeneralizedGravity(model, data, full)[columns]
-    return np.asarray(torques)
+    return np.asarray(torques - own_weights(scene, q[None])[0] if robot.balanced else torques)
 
 
 def _load_torques(scene: Scene, q: Array, times: Array, load: Carried, rows: slice) -> Array:

@@ -1,0 +1,101 @@
+"""How firmly a plan's grasps have to close, and how far."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from guided_lgp.bounds.checks import box_sizes, closing_axis, volumes
+from guided_lgp.bounds.results import Array, Attachment, Trajectory
+from guided_lgp.bounds.verify.attachments import spans
+from guided_lgp.bounds.verify.efforts import GRAVITY, Carried, carried_boxes, derivatives
+from guided_lgp.logic import Skeleton
+from guided_lgp.poses import IDENTITY, compose, inverse, rotate
+from guided_lgp.scene import Scene
+from guided_lgp.scene.world import BOX_DENSITY
+
+FRICTION = 0.6
+"""Coefficient of friction that grips are made for: cardboard on rubber."""
+RATIO = 0.5
+"""Share of what the pads can carry that a load may take; at 0.72 boxes turned in the hand."""
+LEAST = 20.0
+"""N: softer grips are not worth their risk."""
+SQUEEZE = 0.004
+"""How far (m) beyond the sides of a box fingers are told to close: they stop at the box."""
+
+
+@dataclass(frozen=True)
+class Grip:
+    """How a gripper holds a box from its grasp on."""
+
+    box: str
+    gripper: str
+    start: int
+    """Row of its grasp; 0 where it is held at the start."""
+    width: float
+    """m of the side that the fingers close across."""
+    closing: float
+    """Value (rad or m) to which the fingers are told to close; they stop at the box."""
+    force: float
+    """N from either side."""
+    ratio: float
+    """Largest share of the pads' capacity that the load takes, riders included."""
+
+
+def grips_of(
+    scene: Scene, skeleton: Skeleton, switches: Sequence[int], trajectory: Trajectory
+) -> list[Grip]:
+    """The grips of a plan, in their order.
+
+    The pads carry a force of 2 mu N and a torque of 2 mu N r about the closing axis, with r the
+    mean distance of a pad's points from its middle. The force N is the least with which the load,
+    its weight and what accelerates it, takes ``RATIO`` of that, within what the fingers can.
+
+    Args:
+        scene: the initial configuration.
+        skeleton: the actions.
+        switches: row of each action's switch.
+        trajectory: the motion.
+    """
+    robot = scene.robot.description
+    q = trajectory.q[:, [trajectory.joint_names.index(name) for name in robot.moving_joints]]
+    loads = carried_boxes(scene, skeleton, switches, q)
+    tools = scene.robot.tool_poses(q[:, : len(robot.joint_names)])
+    held = spans(scene.state, skeleton, switches, len(q), lambda state: dict(state.held))
+    found = []
+    for span in sorted(held, key=lambda span: (span.start, span.gripper)):
+        fingers = robot.arms[span.gripper].fingers
+        own = next(load for load in loads if load.span.box == span.box and _during(load, span))
+        across = closing_axis(IDENTITY.tolist(), inverse(own.grip).tolist())
+        width = box_sizes(scene)[span.box][across]
+        riders = [load for load in loads if load.span.gripper == span.gripper]
+        riders = [load for load in riders if _during(load, span)]
+        need = _need(scene, tools[span.gripper], trajectory.times, riders, fingers.pad)
+        force = float(np.clip(need / RATIO, LEAST, max(fingers.force, LEAST)))
+        closing = fingers.value(width - SQUEEZE)
+        ratio = need / force
+        found.append(Grip(span.box, span.gripper, span.start, width, closing, force, ratio))
+    return found
+
+
+def _during(load: Carried, span: Attachment) -> bool:
+    """Whether a load is carried while a span lasts."""
+    return load.span.start < span.end and load.span.end > span.start
+
+
+def _need(scene: Scene, tools: Array, times: Array, loads: Sequence[Carried], pad: float) -> float:
+    """The force (N) at which pads just hold their loads, along a motion of the tool (T, 7)."""
+    pulls, torques = np.zeros((2, len(tools), 3))
+    for load in loads:
+        rows = slice(load.span.start, load.span.end + 1)
+        centres = compose(tools, load.grip)[:, :3]
+        changes = np.pad(derivatives(centres, times)[1], ((1, 1), (0, 0)))
+        mass = BOX_DENSITY * volumes(scene)[load.span.box]
+        pull = mass * (changes[rows] + np.array([0.0, 0.0, GRAVITY]))
+        pulls[rows] += pull
+        torques[rows] += np.cross(centres[rows] - tools[rows, :3], pull)
+    closing = rotate(tools[:, 3:], np.array([0.0, 1.0, 0.0]))
+    along = np.sum(pulls * closing, axis=1)
+    sideways = np.linalg.norm(pulls - along[:, None] * closing, axis=1)
+    twist = np.abs(np.sum(torques * closing, axis=1)) / pad
+    return float(np.maximum(sideways, twist).max(initial=0.0)) / (2 * FRICTION)

@@ -1,0 +1,336 @@
+"""Carrying out a plan: what happens when, and what is found at the end."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from types import TracebackType
+
+import numpy as np
+
+from guided_lgp.bounds.checks import Violation, box_bodies
+from guided_lgp.bounds.execution.conditions import AS_PLANNED, Conditions
+from guided_lgp.bounds.execution.forces import grips_of
+from guided_lgp.bounds.execution.hands import closing_rows, opening_rows, parts_of
+from guided_lgp.bounds.execution.noise import misplaced
+from guided_lgp.bounds.execution.simulation import SETTLE_S, Simulation
+from guided_lgp.bounds.goals import GoalTerms
+from guided_lgp.bounds.results import Array, Trajectory
+from guided_lgp.bounds.verify.attachments import switches_of
+from guided_lgp.bounds.verify.geometry import grasp_faults
+from guided_lgp.errors import InputError
+from guided_lgp.logic import Goal, GroundAtom, Objective, Skeleton, State, successor
+from guided_lgp.poses import compose, inverse
+from guided_lgp.scene import Scene
+from guided_lgp.scene.world import World, initial_poses
+
+GRASP_SLACK = 0.006
+"""How far (m, rad) beyond the limits of verification a simulated grasp may be off."""
+KNOCK = 0.005
+"""How far (m) a hand may move what it is about to take."""
+DROP = 0.003
+"""How high (m) above its support a box may be let go of."""
+DRIFT = 0.01
+"""How far (m) a box may be from where the plan leaves it ..."""
+DEVIATIONS = 4.0
+"""... and how many standard deviations farther where arms misplace boxes."""
+UPRIGHT = 0.9
+"""Least vertical part of the contact normals where a box stands on something."""
+PLACE_SLACK = 0.005
+"""How far (m, rad) a box may be off the place that a goal asks for: as it settles."""
+HELD_SLACK = 0.02
+"""How far (m) a held box may have slipped in the hand at the end."""
+_HOME = 1e-4
+"""rad: arms are at their side within it."""
+
+
+@dataclass(frozen=True)
+class PhysicsReport:
+    """Outcome of an execution."""
+
+    success: bool
+    """All goals hold in the settled world, and every box is where the plan leaves it."""
+    goals: Mapping[str, bool] = field(default_factory=dict)
+    """For each goal of the objective, written as ``(on red tab1)``, whether it holds."""
+    drift: float = 0.0
+    """Largest distance (m) of a box from where the plan leaves it."""
+    fault: str = ""
+    """What went wrong, if something did: ``hold pr2L red`` where the gripper missed the box."""
+
+
+def execute(
+    scene: Scene,
+    objective: Objective,
+    skeleton: Skeleton,
+    trajectory: Trajectory,
+    conditions: Conditions = AS_PLANNED,
+) -> PhysicsReport:
+    """Carry out a plan under gravity and read the goals from the settled world.
+
+    Args:
+        scene: the initial configuration.
+        objective: the goals to look at.
+        skeleton: the actions that the trajectory carries out.
+        trajectory: the motion.
+        conditions: how boxes are held, and what is not as planned.
+    """
+    with Execution(scene, conditions) as execution:
+        fault = execution.carry_out(scene, skeleton, trajectory)
+        if fault:
+            return PhysicsReport(False, fault=fault)
+        return execution.report(objective, final_boxes(scene, trajectory))
+
+
+def final_boxes(scene: Scene, trajectory: Trajectory) -> dict[str, Array]:
+    """Where a plan leaves every box: poses (7,), from the scene, the attachments and kinematics."""
+    boxes = initial_poses(scene)
+    names = scene.robot.description.joint_names
+    arms = trajectory.q[:, [trajectory.joint_names.index(name) for name in names]]
+    for attachment in sorted(trajectory.attachments, key=lambda attachment: attachment.start):
+        ends = arms[[attachment.start, attachment.end]]
+        start, end = scene.robot.tool_poses(ends)[attachment.gripper]
+        boxes[attachment.box] = compose(end, compose(inverse(start), boxes[attachment.box]))
+    return boxes
+
+
+class Execution:
+    """A scene in which plans are carried out one after the other; leave it by ``with``."""
+
+    def __init__(self, scene: Scene, conditions: Conditions = AS_PLANNED) -> None:
+        self.state = scene.state
+        """Who holds what and what stands where, by the actions so far."""
+        self._scene, self._conditions = scene, conditions
+        self._robot = scene.robot.description
+        if conditions.grip == "friction":
+            _require_fingers(scene)
+        self._world = World(scene)
+        self._simulation = Simulation(self._world, conditions)
+        self._held: dict[tuple[str, str], tuple[int | None, Array]] = {}
+        self._seen = initial_poses(scene)
+
+    def __enter__(self) -> "Execution":
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self._world.close()
+
+    def carry_out(
+        self, scene: Scene, skeleton: Skeleton, trajectory: Trajectory, actions: int | None = None
+    ) -> str:
+        """Carry out a plan, or its first actions, from where the world is now.
+
+        Args:
+            scene: that the plan starts from.
+            skeleton: its actions.
+            trajectory: its motion.
+            actions: how many of them; the arms are at their side after the last one.
+
+        Returns:
+            What went wrong; empty if nothing did.
+        """
+        rows = switches_of(scene, skeleton, trajectory)
+        if isinstance(rows, Violation):
+            return rows.constraint
+        noise, seed = self._conditions.noise, self._conditions.seed
+        if noise:
+            trajectory = misplaced(scene, skeleton, rows, trajectory, noise, seed)
+        self._forces = {
+            (grip.gripper, grip.box, grip.start): self._conditions.force or grip.force
+            for grip in grips_of(scene, skeleton, rows, trajectory)
+        }
+        self._simulation.load(trajectory)
+        for box, gripper in sorted(scene.held.items()):
+            if (gripper, box) not in self._held:
+                self._reach(gripper, box)
+                if fault := self._take(gripper, box, 0):
+                    return fault
+        self._simulation.rest(SETTLE_S)
+        self._seen = self.boxes()
+        until = _end(scene, rows, trajectory, actions)
+        for row, event in self._events(scene.state, skeleton, rows, trajectory):
+            if row <= until:
+                self._simulation.follow(float(trajectory.times[row]))
+                if fault := event():
+                    return fault
+        self._simulation.follow(float(trajectory.times[until]))
+        self._simulation.rest(SETTLE_S)
+        return ""
+
+    def report(self, objective: Objective, planned: Mapping[str, Array]) -> PhysicsReport:
+        """What holds in the world as it is.
+
+        Args:
+            objective: the goals to look at.
+            planned: where boxes should be: poses (7,).
+        """
+        goals = {
+            str(goal): all(self._holds(a) for a in self.state.domain.conditions(goal))
+            and self._in_place(goal)
+            for goal in objective
+        }
+        boxes = self.boxes()
+        drifts = {
+            box: float(np.linalg.norm(boxes[box][:3] - planned[box][:3])) for box in sorted(boxes)
+        }
+        worst = max(drifts, key=lambda box: drifts[box])
+        allowed = DRIFT + DEVIATIONS * self._conditions.noise
+        fault = f"drift {worst}" if drifts[worst] >= allowed else ""
+        return PhysicsReport(all(goals.values()) and not fault, goals, drifts[worst], fault)
+
+    def boxes(self) -> dict[str, Array]:
+        """Pose (7,) of every box."""
+        return {box: self._simulation.box(box) for box in self._world.boxes}
+
+    def joints(self) -> Array:
+        """Values (n,) of the arms' joints (rad)."""
+        return self._simulation.joints()
+
+    def held(self) -> dict[str, str]:
+        """Boxes that are in a hand, and in which."""
+        return {box: gripper for gripper, box in sorted(self._held) if self._in_hand(gripper, box)}
+
+    def put(self, box: str, placement: Array) -> None:
+        """Move a box to a pose (7,), as somebody else might."""
+        self._simulation.put(box, placement)
+        self._simulation.rest(SETTLE_S)
+
+    def _events(
+        self, state: State, skeleton: Skeleton, rows: Sequence[int], trajectory: Trajectory
+    ) -> Iterator[tuple[int, Callable[[], str]]]:
+        """What happens at which row, in order: hands reach boxes, take them, let go and leave."""
+        found: list[tuple[int, int, Callable[[], str]]] = []
+        last = dict.fromkeys(self._robot.grippers, 0)
+        for index, (action, row) in enumerate(zip(skeleton, rows, strict=True)):
+            before, state = state, successor(state, action)
+            taken = sorted(set(state.held) - set(before.held))
+            left = sorted(set(before.held) - set(state.held))
+            for box, gripper in taken:
+                at = closing_rows(self._robot.arms[gripper], trajectory, last[gripper], row)
+                found.append((at, index, partial(self._reach, gripper, box)))
+                found.append((row, index, partial(self._take, gripper, box, row)))
+            for box, gripper in left:
+                found.append((row, index, partial(self._let_go, gripper, box, state)))
+                after = next((r for r in rows[index + 1 :] if r > row), len(trajectory.times) - 1)
+                at = opening_rows(self._robot.arms[gripper], trajectory, row, after)
+                found.append((at, index, partial(self._leave, gripper, box)))
+            for _, gripper in (*taken, *left):
+                last[gripper] = row
+            found.append((row, index, partial(self._enter, state)))
+        yield from ((row, event) for row, _, event in sorted(found, key=lambda e: e[:2]))
+
+    def _enter(self, state: State) -> str:
+        self.state = state
+        return ""
+
+    def _reach(self, gripper: str, box: str) -> str:
+        """The open hand is at the box; its links may pass through it until it has left again."""
+        seen, self._seen[box] = self._seen[box], self._simulation.box(box)
+        parts = parts_of(self._robot, gripper)
+        fixed = self._conditions.grip == "fixed"
+        links = self._robot.arms[gripper].hand_links if fixed else parts.between
+        self._simulation.touch(links, box, allowed=False)
+        pushed = float(np.linalg.norm(self._seen[box][:3] - seen[:3]))
+        stands = self.state.support_of(box) in self._world.supports
+        return f"knock {gripper} {box}" if stands and pushed > KNOCK else ""
+
+    def _take(self, gripper: str, box: str, row: int) -> str:
+        """The fingers have closed; a fault if they are not on the box."""
+        tool, placement = self._simulation.tool(gripper), self._simulation.box(box)
+        body, arm = box_bodies(self._scene)[box], self._robot.arms[gripper]
+        faults = grasp_faults(arm, box, body, placement.tolist(), tool.tolist())
+        if faults and faults[0].amount > GRASP_SLACK:
+            return faults[0].constraint
+        constraint = None
+        if self._conditions.grip == "friction":
+            self._simulation.squeeze(gripper, self._forces[gripper, box, row])
+        else:
+            in_palm = compose(inverse(self._simulation.palm(gripper)), placement)
+            constraint = self._simulation.fix(gripper, box, in_palm)
+        self._held[gripper, box] = constraint, compose(inverse(tool), placement)
+        return ""
+
+    def _let_go(self, gripper: str, box: str, after: State) -> str:
+        """The fingers begin to open; a fault if the box is above what it should stand on."""
+        constraint, _ = self._held.pop((gripper, box))
+        if constraint is None:
+            self._simulation.relax(gripper)
+        else:
+            self._simulation.free(constraint)
+        support = after.support_of(box)
+        high = support is not None and self._world.distance(box, support, 2 * DROP) > DROP
+        return f"stand {box} {support}" if high else ""
+
+    def _leave(self, gripper: str, box: str) -> str:
+        """The fingers are open: what touches the box from now on pushes it."""
+        self._simulation.touch(self._robot.arms[gripper].hand_links, box, allowed=True)
+        self._seen = self.boxes()
+        return ""
+
+    def _holds(self, atom: GroundAtom) -> bool:
+        """Whether a condition of a goal holds; what no contact shows, the state tells."""
+        match atom.predicate, atom.symbols:
+            case "held", (box,):
+                seen = any(self._in_hand(gripper, box) for gripper, _ in self._held)
+            case "holds", (gripper, box):
+                seen = self._in_hand(gripper, box)
+            case "on", (box, support):
+                seen = self._rests(box, support)
+            case _:
+                return atom.holds_in(self.state)
+        return seen != atom.negated
+
+    def _in_place(self, goal: Goal) -> bool:
+        """Whether a box is where a goal wants it, but for what settling may shift."""
+        terms = GoalTerms.of((goal,), self._scene.symbols.domain)
+        faults = terms.faults(self._scene, self.boxes())
+        return all(fault.amount <= PLACE_SLACK for fault in faults)
+
+    def _in_hand(self, gripper: str, box: str) -> bool:
+        """Whether a gripper holds a box that has not slipped."""
+        if (gripper, box) not in self._held:
+            return False
+        _, grip = self._held[gripper, box]
+        there = compose(self._simulation.tool(gripper), grip)[:3]
+        return bool(np.linalg.norm(there - self._simulation.box(box)[:3]) < HELD_SLACK)
+
+    def _rests(self, box: str, support: str) -> bool:
+        """Whether a box that nothing holds is at rest upon a support."""
+        if any(held == box for _, held in self._held):
+            return False
+        normals = self._simulation.normals(box, support)
+        return bool(normals) and min(normals) > UPRIGHT
+
+
+def _require_fingers(scene: Scene) -> None:
+    """Friction needs fingers that press.
+
+    Raises:
+        InputError: a hand has jaws that do not move.
+    """
+    for gripper, arm in scene.robot.description.arms.items():
+        if not arm.fingers.joints:
+            raise InputError("grip", f"{gripper} has no fingers that press", "fixed")
+
+
+def _end(scene: Scene, rows: Sequence[int], trajectory: Trajectory, actions: int | None) -> int:
+    """The row at which the arms are at their side after some actions, or the last one.
+
+    Raises:
+        InputError: they go on to the next action without that.
+    """
+    if actions is None or actions >= len(rows):
+        return len(trajectory.times) - 1
+    if not actions:
+        return 0
+    names = scene.robot.description.joint_names
+    q = trajectory.q[:, [trajectory.joint_names.index(name) for name in names]]
+    home = np.abs(q - scene.robot.description.home).max(axis=1) < _HOME
+    at = [row for row in range(rows[actions - 1], rows[actions]) if home[row]]
+    if not at:
+        fault = f"the arms do not rest at their side after action {actions}"
+        raise InputError("plan", fault, "a plan in which they do")
+    return at[0]

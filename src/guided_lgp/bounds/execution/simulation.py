@@ -1,0 +1,224 @@
+"""A world in which time passes, and a robot with motors in it."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from guided_lgp.bounds.execution.conditions import Conditions
+from guided_lgp.bounds.execution.hands import parts_of
+from guided_lgp.bounds.results import Array, Trajectory
+from guided_lgp.bounds.verify.efforts import GRAVITY, own_weights
+from guided_lgp.scene.bullet import pybullet
+from guided_lgp.scene.world import World
+
+RATE = 480
+"""Simulation steps per second: at 120, a tower of eight boxes creeps 14 mm in 5 s, here 0.2 mm."""
+ITERATIONS = 150
+"""Of the contact solver, in each step."""
+SETTLE_S = 1.0
+"""How long (s) the world rests before the first motion and after the last."""
+GRIP_S = 0.25
+"""How long (s) a hand waits after its fingers have closed: until they press."""
+_FINGER_FORCE, _FIXED_FORCE = 100.0, 1e5
+"""Largest force (N or Nm) of the joints of hands, and of those that the scene fixes."""
+_STRONGEST = 1000.0
+"""Nm of joints whose effort nobody limits."""
+_SQUEEZING = 0.2
+"""Speed (m/s) of fingertips that press until something stops them."""
+_TIP_TORQUE = 0.05
+"""Nm: fingertips that hang on fingers turn until they lie flat on what they hold."""
+
+
+class Simulation:
+    """Time, motors and contacts of a world."""
+
+    def __init__(self, world: World, conditions: Conditions) -> None:
+        self.world = world
+        self._client = world.client
+        self._robot = world.scene.robot.description
+        self._squeezing: set[str] = set()
+        pybullet.setGravity(0, 0, -GRAVITY, physicsClientId=self._client)
+        pybullet.setPhysicsEngineParameter(
+            fixedTimeStep=1 / RATE, numSolverIterations=ITERATIONS, physicsClientId=self._client
+        )
+        self._rub(float(np.sqrt(conditions.friction)))
+        self._hold_other_joints()
+
+    def load(self, trajectory: Trajectory) -> None:
+        """Get ready to follow a motion from its start."""
+        moments = np.arange(int(np.ceil(trajectory.times[-1] * RATE)) + 1) / RATE
+        columns = [trajectory.joint_names.index(name) for name in self._robot.moving_joints]
+        self._targets = np.stack(
+            [np.interp(moments, trajectory.times, trajectory.q[:, i]) for i in columns], axis=1
+        )
+        self._motors = self._efforts()
+        self._step = 0
+        self._share_motors()
+
+    def follow(self, time: float) -> None:
+        """Drive the joints along the motion until a moment (s)."""
+        while self._step < min(round(time * RATE), len(self._targets) - 1):
+            self._step += 1
+            self._drive((self._targets[self._step] - self._targets[self._step - 1]) * RATE)
+
+    def rest(self, seconds: float) -> None:
+        """Hold still for some time."""
+        for _ in range(int(seconds * RATE)):
+            self._drive(np.zeros(self._targets.shape[1]))
+
+    def touch(self, links: Sequence[str], box: str, allowed: bool) -> None:
+        """Let links touch a box, or pass through it."""
+        for link in links:
+            pybullet.setCollisionFilterPair(
+                self.world.robot,
+                self.world.boxes[box],
+                self.world.links[link],
+                -1,
+                int(allowed),
+                physicsClientId=self._client,
+            )
+
+    def fix(self, gripper: str, box: str, grip: Array) -> int:
+        """Fix a box to the palm at a pose (7,) in it; returns the constraint's number."""
+        number: int = pybullet.createConstraint(
+            self.world.robot,
+            self.world.links[self._robot.arms[gripper].hand_links[0]],
+            self.world.boxes[box],
+            -1,
+            pybullet.JOINT_FIXED,
+            (0, 0, 0),
+            grip[:3],
+            (0, 0, 0),
+            grip[3:],
+            physicsClientId=self._client,
+        )
+        return number
+
+    def free(self, constraint: int) -> None:
+        """Remove a constraint."""
+        pybullet.removeConstraint(constraint, physicsClientId=self._client)
+
+    def squeeze(self, gripper: str, force: float) -> None:
+        """Let the fingers press with a force (N) from now on, whatever the motion says."""
+        self._squeezing.add(gripper)
+        self._share_motors()
+        fingers, parts = self._robot.arms[gripper].fingers, parts_of(self._robot, gripper)
+        inwards = np.sign(fingers.closed - fingers.opened) * np.sign(fingers.ratios)
+        signs = dict(zip(fingers.joints, inwards.tolist(), strict=True))
+        for joint in parts.pressing:
+            pybullet.setJointMotorControl2(
+                self.world.robot,
+                self.world.joints[joint],
+                pybullet.VELOCITY_CONTROL,
+                targetVelocity=signs[joint] * _SQUEEZING / fingers.lever,
+                force=force * fingers.lever,
+                physicsClientId=self._client,
+            )
+        self.rest(GRIP_S)
+
+    def relax(self, gripper: str) -> None:
+        """Let the fingers follow the motion again."""
+        self._squeezing.discard(gripper)
+        self._share_motors()
+
+    def put(self, box: str, placement: Array) -> None:
+        """Move a box to a pose (7,), at rest."""
+        number = self.world.boxes[box]
+        pybullet.resetBasePositionAndOrientation(
+            number, placement[:3], placement[3:], physicsClientId=self._client
+        )
+        pybullet.resetBaseVelocity(number, (0, 0, 0), (0, 0, 0), physicsClientId=self._client)
+
+    def palm(self, gripper: str) -> Array:
+        """Pose (7,) of the palm's centre of mass, to which constraints refer."""
+        state = pybullet.getLinkState(
+            self.world.robot,
+            self.world.links[self._robot.arms[gripper].hand_links[0]],
+            computeForwardKinematics=True,
+            physicsClientId=self._client,
+        )
+        return np.array([*state[0], *state[1]])
+
+    def tool(self, gripper: str) -> Array:
+        """Pose (7,) of a tool frame."""
+        return np.asarray(self.world.tool_poses([gripper])[0])
+
+    def box(self, box: str) -> Array:
+        """Pose (7,) of a box."""
+        position, turn = pybullet.getBasePositionAndOrientation(
+            self.world.boxes[box], physicsClientId=self._client
+        )
+        return np.array([*position, *turn])
+
+    def joints(self) -> Array:
+        """Values (n,) of the arms' joints."""
+        numbers = [self.world.joints[name] for name in self._robot.joint_names]
+        states = pybullet.getJointStates(self.world.robot, numbers, physicsClientId=self._client)
+        return np.array([state[0] for state in states])
+
+    def normals(self, upper: str, lower: str) -> list[float]:
+        """Vertical parts of the contact normals from one body to a box."""
+        body = (self.world.supports | self.world.boxes)[lower]
+        contacts = pybullet.getContactPoints(
+            self.world.boxes[upper], body, physicsClientId=self._client
+        )
+        return [contact[7][2] for contact in contacts]
+
+    def _rub(self, friction: float) -> None:
+        """Give all bodies the friction whose square counts between two of them."""
+        bodies = [(body, -1) for body in (self.world.supports | self.world.boxes).values()]
+        hands = [link for arm in self._robot.arms.values() for link in arm.hand_links]
+        for body, link in (*bodies, *((self.world.robot, self.world.links[h]) for h in hands)):
+            pybullet.changeDynamics(
+                body, link, lateralFriction=friction, physicsClientId=self._client
+            )
+
+    def _hold_other_joints(self) -> None:
+        """Keep what the motion does not move where the scene has it."""
+        fixed = self.world.scene.robot.fixed_values
+        for name, joint in self.world.joints.items():
+            kind = pybullet.getJointInfo(self.world.robot, joint, physicsClientId=self._client)[2]
+            if kind != pybullet.JOINT_FIXED:
+                pybullet.setJointMotorControl2(
+                    self.world.robot,
+                    joint,
+                    pybullet.POSITION_CONTROL,
+                    targetPosition=fixed.get(name, 0.0),
+                    force=_FIXED_FORCE if name in fixed else _FINGER_FORCE,
+                    physicsClientId=self._client,
+                )
+
+    def _efforts(self) -> Array:
+        """Largest force of each moving joint: of motors, and what springs carry besides."""
+        arms = len(self._robot.joint_names)
+        efforts = np.minimum(self._robot.effort_limits, _STRONGEST)
+        if self._robot.balanced:
+            sparse = self._targets[:: RATE // 10, :arms]
+            efforts = efforts + np.abs(own_weights(self.world.scene, sparse)).max(axis=0)
+        return np.concatenate([efforts, np.full(self._targets.shape[1] - arms, _FINGER_FORCE)])
+
+    def _share_motors(self) -> None:
+        """Find the joints that follow the motion; those that press do not."""
+        hands = [parts_of(self._robot, gripper) for gripper in sorted(self._squeezing)]
+        pressing = {joint for hand in hands for joint in hand.pressing}
+        hanging = {joint for hand in hands for joint in hand.hanging}
+        names = self._robot.moving_joints
+        self._driven = [i for i, name in enumerate(names) if name not in pressing]
+        self._numbers = [self.world.joints[names[i]] for i in self._driven]
+        self._forces = [
+            _TIP_TORQUE if names[i] in hanging else float(self._motors[i]) for i in self._driven
+        ]
+
+    def _drive(self, velocity: Array) -> None:
+        pybullet.setJointMotorControlArray(
+            self.world.robot,
+            self._numbers,
+            pybullet.POSITION_CONTROL,
+            targetPositions=self._targets[self._step, self._driven].tolist(),
+            targetVelocities=velocity[self._driven].tolist(),
+            forces=self._forces,
+            positionGains=[0.3] * len(self._driven),
+            velocityGains=[1.0] * len(self._driven),
+            physicsClientId=self._client,
+        )
+        pybullet.stepSimulation(physicsClientId=self._client)
