@@ -10,7 +10,6 @@ import subprocess
 import sys
 import venv
 from collections.abc import Sequence
-from importlib import metadata
 from importlib.metadata import Distribution
 from pathlib import Path
 
@@ -226,10 +225,15 @@ def test_every_extra_is_explained() -> None:
         assert f"| `{extra}` |" in page, extra
 
 
-def test_the_version_is_said_once() -> None:
+def test_the_release_is_the_same_everywhere(wheel: Path) -> None:
+    heading = r"^## \[(\S+)\] - (\d{4}-\d\d-\d\d)$"
+    changelog = (ROOT / "CHANGELOG.md").read_text()
+    newest, date = re.findall(heading, changelog, flags=re.MULTILINE)[0]
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
-    assert citation["version"] == __version__ == metadata.version("guided-lgp")
-    assert f"## [{__version__}]" in (ROOT / "CHANGELOG.md").read_text()
+    assert newest == __version__ == citation["version"] == wheel.name.split("-")[1]
+    assert date == str(citation["date-released"])
+    for page in (ROOT / "README.md", ROOT / "docs/tutorial.md"):
+        assert f"weights shipped with {__version__}" in page.read_text(encoding="utf-8")
 
 
 def test_continuous_integration_runs_what_anyone_can_run() -> None:

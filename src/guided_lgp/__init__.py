@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from guided_lgp.planning import plan
     from guided_lgp.scene import Scene, load_scene
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __all__ = ["Goal", "Objective", "Scene", "load_scene", "parse_objective", "plan"]
 
