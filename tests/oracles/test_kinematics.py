@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from guided_lgp.bounds.program.closed_form import human_like, inverse
+from guided_lgp.bounds.program.closed_form import inverse
 from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.poses import apply, rotation_matrix
 from guided_lgp.poses import inverse as inverse_pose
@@ -21,7 +21,7 @@ SCENE = Scene(
 
 PR2 = load_robot("pr2")
 (CHAIN,) = kinematics_of(PR2).chains
-LENGTHS = human_like(CHAIN)
+LENGTHS = CHAIN.human_like
 
 
 def _forward() -> ca.Function:

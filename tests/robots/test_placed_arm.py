@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from guided_lgp.poses import rotation_matrix
-from guided_lgp.robots import PlacedArm
+from guided_lgp.robots import PlacedArm, load_robot, robot_names
+from guided_lgp.robots.inverse import lengths_of
 from guided_lgp.scene import PlacedRobot
 
 TURNED = PlacedRobot(base=(0.1, -0.2, 0.3), torso=0.2)
@@ -84,3 +85,15 @@ def test_joints_of_more_than_a_turn_follow_the_reference() -> None:
     q = np.array([0.0, 0.0, 0.0, 0.0, -3.0, 0.0, 3.0])
     assert np.abs(arm.near(q, reference) - reference).max() < np.pi
     assert arm.turning.tolist() == [4, 6]
+
+
+def test_arms_like_a_humans_are_recognised_by_their_description() -> None:
+    """The lengths are those of the PR2's manual; a mirrored arm has those of its mirror image."""
+    for gripper in GRIPPERS:
+        lengths = lengths_of(ROBOT, gripper)
+        assert lengths is not None
+        assert lengths.shoulder.tolist() == [-0.05, 0.188, 0.790675]
+        assert (lengths.lift, lengths.upper, lengths.fore, lengths.hand) == (0.1, 0.4, 0.321, 0.18)
+        assert lengths.raised_by == ("torso_lift_joint",)
+    others = [load_robot(name) for name in robot_names() if name != "pr2"]
+    assert not any(lengths_of(robot, gripper) for robot in others for gripper in robot.grippers)

@@ -120,7 +120,6 @@ def _arm(
         jerk_limits=robot.jerk * acceleration,
         effort_limits=np.array([joint.effort for joint in joints]),
         redundant=None if arm.redundant is None else arm.joints.index(arm.redundant),
-        closed_form=arm.closed_form,
         mirror_of=arm.mirrors,
         signs=signs,
         tool_link=arm.tool.link,

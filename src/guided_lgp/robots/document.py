@@ -82,23 +82,6 @@ class FingersDocument(Document):
     """Mean distance of the points of a fingertip's pad from its middle."""
 
 
-class OffsetShoulderDocument(Document):
-    """Measures of an arm whose kinematics are solved by ``offset_shoulder.py``."""
-
-    shoulder: tuple[Number, Number, Number]
-    """Origin of the pan axis at the height of the lift axis, in the base link."""
-    lifted_by: str | None = None
-    """The fixed joint that raises the shoulder."""
-    pan_offset: Length
-    """From the pan axis to the lift axis."""
-    upper_arm: Length
-    forearm: Length
-    hand: Length
-    """From the wrist to the tool frame."""
-    reach: Length
-    """Radius around the shoulder in which tools are looked for."""
-
-
 class SegmentsDocument(Document):
     """Links at the ends of the arm's segments, and how far those reach beyond their axes."""
 
@@ -119,8 +102,6 @@ class ArmDocument(Document):
     home: tuple[Number, ...]
     redundant: str | None = None
     """The joint that parametrises the inverse kinematics of an arm with seven."""
-    closed_form: OffsetShoulderDocument | None = None
-    """The inverse kinematics by formulas of its own; without, the general one."""
     tool: ToolDocument
     hand_links: Names
     """The palm first."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guided_lgp.poses import Array, rotation_matrix
-from guided_lgp.robots.inverse import OffsetShoulder, inverse_kinematics
+from guided_lgp.robots.inverse import OffsetShoulder, inverse_kinematics, lengths_of
 from guided_lgp.robots.robot import Robot
 
 _VALUES = 15
@@ -125,13 +125,12 @@ class PlacedArm:
 
 
 def _solver(robot: Robot, gripper: str, fixed: Mapping[str, float]) -> tuple[Solver, Array, float]:
-    """The solver of an arm, and centre (3,) and radius (m) of a ball that the tool stays in."""
+    """The solver of an arm; centre (3,) and radius (m) of a ball in which tools are looked for."""
     arm = robot.arms[gripper]
-    measures = arm.closed_form
-    if measures is not None:
+    if (lengths := lengths_of(robot, gripper)) is not None:
         limits = np.sort(arm.signs[:, None] * arm.limits, axis=1)
-        lift = 0.0 if measures.lifted_by is None else fixed[measures.lifted_by]
-        solver = OffsetShoulder(measures, limits, arm.signs, lift)
-        return solver, solver.shoulder, measures.reach
+        lift = sum(fixed[name] for name in lengths.raised_by)
+        solver = OffsetShoulder(lengths, limits, arm.signs, lift)
+        return solver, solver.shoulder, float(arm.reaches[1])
     general = inverse_kinematics(robot, gripper, fixed)
     return general, general.chain.points[1], float(arm.lever_arms[1])

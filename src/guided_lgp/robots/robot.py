@@ -11,7 +11,7 @@ import numpy as np
 from guided_lgp.poses import IDENTITY, Array
 from guided_lgp.robots.chain import turn
 from guided_lgp.robots.description import Description
-from guided_lgp.robots.document import FixedJoint, OffsetShoulderDocument
+from guided_lgp.robots.document import FixedJoint
 from guided_lgp.robots.kinematics import Kinematics
 
 CLEARANCE = 0.01
@@ -138,8 +138,6 @@ class Arm:
     """(n,) Nm that the motors exert at most; infinite where nobody says."""
     redundant: int | None
     """Index of the joint that parametrises the inverse kinematics, if the arm has one too many."""
-    closed_form: OffsetShoulderDocument | None
-    """Measures for the inverse kinematics by formulas of its own, if it has them."""
     mirror_of: str | None
     """The gripper of the arm of which this one is the mirror image, at the base's plane y = 0."""
     signs: Array

@@ -13,7 +13,6 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from guided_lgp.bounds.program.closed_form import human_like
 from guided_lgp.bounds.program.kinematics import ArmKinematics
 from guided_lgp.poses import Array
 
@@ -81,14 +80,14 @@ class Limb:
             arm: of a robot.
             fixed: values (m) of the joints that the scene sets.
         """
-        lengths = human_like(arm.chain)
+        lengths = arm.chain.human_like
         limits = np.array(arm.limits)
         bent_one_way = limits[3, 0] >= -np.pi and limits[3, 1] <= 0.0
         if lengths is None or not bent_one_way:
             return None
         if arm.side < 0:  # turned over at y = 0, turns about x and z change their sign
             limits[_TURNED_OVER] = -limits[_TURNED_OVER, ::-1]
-        raised = sum(fixed[joint.name] for joint in arm.chain.joints if joint.name in fixed)
+        raised = sum(fixed[name] for name in lengths.raised_by)
         shoulder = lengths.shoulder * (1.0, arm.side, 1.0) + (0.0, 0.0, raised)
         return cls(shoulder, lengths.lift, lengths.upper, lengths.fore, lengths.hand, limits)
 

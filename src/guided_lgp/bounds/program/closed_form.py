@@ -1,73 +1,16 @@
-"""Closed-form inverse kinematics, in CasADi, of arms built like a human one.
+"""Closed-form inverse kinematics, in CasADi, of arms built like a human's.
 
-Such an arm turns about z, y, x (shoulder), y (elbow), x, y, x (wrist), with all offsets along x:
-the arms of the PR2. Its seventh degree of freedom is the turn about z.
+``robots/inverse/human_like.py`` says which those are. Unlike the formulas there for exact
+solutions, these give the nearest values where a target is out of reach, and are compiled.
 """
 
-from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from guided_lgp.bounds.program.kinematics import Chain, turned
-from guided_lgp.bounds.results import Array
-from guided_lgp.robots.chain import Joint
-
-_AXES = np.eye(3)[[2, 1, 0, 1, 0, 1, 0]]
-_OFFSETS = np.zeros((8, 3), dtype=bool)
-_OFFSETS[0], _OFFSETS[[1, 3, 5, 7], 0] = True, True
-"""Where such a chain has offsets: before shoulder, lift, elbow and wrist, and to the tool frame."""
-
-
-@dataclass(frozen=True)
-class HumanLike:
-    """Lengths (m) of such an arm."""
-
-    shoulder: Array
-    """(3,) the first axis in the robot's frame, with the joints that the scene sets at zero."""
-    lift: float
-    """From the first axis to the second."""
-    upper: float
-    """From there to the elbow."""
-    fore: float
-    """From the elbow to the wrist."""
-    hand: float
-    """From the wrist to the tool frame."""
-
-
-def human_like(chain: Chain) -> HumanLike | None:
-    """The lengths of a chain, or None if it is built otherwise."""
-    rotations = [*(joint.rotation for joint in chain.joints), chain.tool[0]]
-    axes = [joint.axis for joint in chain.joints if joint.name in chain.moving]
-    if not np.array_equal(axes, _AXES) or not np.array_equal(
-        rotations, [np.eye(3)] * len(rotations)
-    ):
-        return None
-    first = next(i for i, joint in enumerate(chain.joints) if joint.name in chain.moving)
-    set_by_scene = [i for i, joint in enumerate(chain.joints) if joint.name in chain.fixed]
-    if any(i > first or not _raises(chain.joints[i]) for i in set_by_scene):
-        return None
-    offsets = _offsets(chain)
-    if np.any(offsets[~_OFFSETS]):
-        return None
-    lengths = (float(offsets[i, 0]) for i in (1, 3, 5, 7))
-    return HumanLike(offsets[0], *lengths)
-
-
-def _raises(joint: Joint) -> bool:
-    return joint.kind == "prismatic" and np.array_equal(joint.axis, (0.0, 0.0, 1.0))
-
-
-def _offsets(chain: Chain) -> Array:
-    """(n + 1, 3) m: to each moving joint from the one before, and to the tool frame."""
-    offsets = [np.zeros(3)]
-    for joint in chain.joints:
-        offsets[-1] = offsets[-1] + joint.position
-        if joint.name in chain.moving:
-            offsets.append(np.zeros(3))
-    offsets[-1] = offsets[-1] + chain.tool[1]
-    return np.array(offsets)
+from guided_lgp.bounds.program.kinematics import turned
+from guided_lgp.robots.inverse.human_like import AXES, HumanLike
 
 
 def inverse(
@@ -96,7 +39,7 @@ def inverse(
     target = ca.mtimes(mirror, position)
     axes = ca.mtimes([mirror, rotation, mirror])
     wrist = target - arm.hand * axes[:, 0] - arm.shoulder - ca.vertcat(0, 0, raised)
-    wrist = ca.mtimes(turned(_AXES[0], -pan), wrist) - ca.vertcat(arm.lift, 0, 0)
+    wrist = ca.mtimes(turned(AXES[0], -pan), wrist) - ca.vertcat(arm.lift, 0, 0)
     distance = ca.norm_2(wrist)
     cosine = (distance**2 - arm.upper**2 - arm.fore**2) / (2 * arm.upper * arm.fore)
     elbow = -ca.acos(_clip(cosine))
@@ -108,7 +51,7 @@ def inverse(
     above = out * ca.cos(roll)
     lift = ca.atan2(above * wrist[0] - along * wrist[2], along * wrist[0] + above * wrist[2])
     forearm = ca.SX.eye(3)
-    for axis, angle in zip(_AXES, (pan, lift, roll, elbow), strict=False):
+    for axis, angle in zip(AXES, (pan, lift, roll, elbow), strict=False):
         forearm = ca.mtimes(forearm, turned(axis, angle))
     remaining = ca.mtimes(forearm.T, axes)
     flex = -ca.acos(_clip(remaining[0, 0]))

@@ -11,13 +11,13 @@ from typing import Any, Protocol
 import casadi as ca
 import numpy as np
 
-from guided_lgp.bounds.program.closed_form import HumanLike, human_like, inverse
+from guided_lgp.bounds.program.closed_form import inverse
 from guided_lgp.bounds.program.grasp import Hand, tool_target, tool_targets
 from guided_lgp.bounds.program.kinematics import ArmKinematics, Chain, RobotKinematics
 from guided_lgp.bounds.program.slots import HeldBox
 from guided_lgp.bounds.results import Array
 from guided_lgp.robots import Robot
-from guided_lgp.robots.inverse import inverse_kinematics
+from guided_lgp.robots.inverse import HumanLike, inverse_kinematics
 
 _SHOULDER_JOINTS = 4
 """The joints that move most of the arm; the wrist turns at no cost."""
@@ -175,7 +175,7 @@ def closed_forms(kinematics: RobotKinematics) -> dict[str, Any]:
     return {
         arm.chain.name: _closed_form(arm, lengths)
         for arm in reversed(kinematics.arms.values())
-        if (lengths := human_like(arm.chain)) is not None
+        if (lengths := arm.chain.human_like) is not None
     }
 
 

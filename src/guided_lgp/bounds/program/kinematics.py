@@ -18,6 +18,7 @@ from guided_lgp.bounds.results import Array
 from guided_lgp.poses import rotation_matrix
 from guided_lgp.robots import Arm, Robot
 from guided_lgp.robots.chain import Joint, path_between, read_joints
+from guided_lgp.robots.inverse.human_like import HumanLike, human_like
 from guided_lgp.robots.robot import Sphere
 
 
@@ -53,6 +54,11 @@ class Chain:
     """The spheres that stand for the arm against another."""
     palm_front: float
     """x of the palm's front in the tool frame (m)."""
+
+    @cached_property
+    def human_like(self) -> HumanLike | None:
+        """The arm's lengths if it is built like a human's, so that formulas solve it."""
+        return human_like(self.joints, self.moving, self.fixed, self.tool)
 
     @cached_property
     def levers(self) -> tuple[float, ...]:

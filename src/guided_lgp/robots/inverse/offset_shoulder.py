@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guided_lgp.poses import Array
-from guided_lgp.robots.document import OffsetShoulderDocument
+from guided_lgp.robots.inverse.human_like import HumanLike
 
 _TURN = 2 * np.pi
 _JUMP = 0.35
@@ -26,9 +26,7 @@ _CONTINUOUS = [4, 6]
 class OffsetShoulder:
     """All solutions of one arm; see :class:`guided_lgp.robots.inverse.InverseKinematics`."""
 
-    def __init__(
-        self, lengths: OffsetShoulderDocument, limits: Array, signs: Array, lift: float
-    ) -> None:
+    def __init__(self, lengths: HumanLike, limits: Array, signs: Array, lift: float) -> None:
         """Prepare an arm.
 
         Args:
@@ -40,7 +38,7 @@ class OffsetShoulder:
         self._lengths = lengths
         self._signs = signs
         self._mirror = np.diag([1.0, signs[0], 1.0])
-        self.shoulder = self._mirror @ np.array(lengths.shoulder) + np.array([0.0, 0.0, lift])
+        self.shoulder = self._mirror @ lengths.shoulder + np.array([0.0, 0.0, lift])
         self._limits = limits + np.array([1e-4, -1e-4])
         self._limits[[3, 5], 1] = np.minimum(self._limits[[3, 5], 1], -_SINGULAR)
 
@@ -58,13 +56,13 @@ class OffsetShoulder:
             q (..., 2, 7), one row per side of the elbow, the two continuous joints within half a
             turn of zero, and valid (..., 2): inside reach and joint limits.
         """
-        upper, fore, hand = self._lengths.upper_arm, self._lengths.forearm, self._lengths.hand
+        upper, fore, hand = self._lengths.upper, self._lengths.fore, self._lengths.hand
         limits = self._limits
         rot = self._mirror @ rotation @ self._mirror
         wrist = (position - self.shoulder) @ self._mirror - hand * rot[..., :, 0]
         pan = redundancy * self._signs[0]
         sin1, cos1 = np.sin(pan), np.cos(pan)
-        x = cos1 * wrist[..., 0] + sin1 * wrist[..., 1] - self._lengths.pan_offset
+        x = cos1 * wrist[..., 0] + sin1 * wrist[..., 1] - self._lengths.lift
         y = cos1 * wrist[..., 1] - sin1 * wrist[..., 0]
         z = wrist[..., 2]
         cos4 = (x * x + y * y + z * z - upper**2 - fore**2) / (2 * upper * fore)
@@ -132,11 +130,11 @@ class OffsetShoulder:
         Args:
             q: (..., 7) in rad.
         """
-        upper, fore, hand = self._lengths.upper_arm, self._lengths.forearm, self._lengths.hand
+        upper, fore, hand = self._lengths.upper, self._lengths.fore, self._lengths.hand
         c, s = np.cos(q * self._signs), np.sin(q * self._signs)
         frame = np.broadcast_to(np.eye(3), (*q.shape[:-1], 3, 3))
         frame = _turn(frame, 2, c[..., 0], s[..., 0])
-        origin = self._lengths.pan_offset * frame[..., :, 0]
+        origin = self._lengths.lift * frame[..., :, 0]
         frame = _turn(frame, 1, c[..., 1], s[..., 1])
         frame = _turn(frame, 0, c[..., 2], s[..., 2])
         origin = origin + upper * frame[..., :, 0]
