@@ -137,6 +137,7 @@ class Task:
         for action in skeleton:
             self.states.append(successor(self.states[-1], action))
         self.start = situation_at_start(scene, goals.upright)
+        self._reaches: dict[tuple[str | bytes, ...], Reach] = {}
 
     def __len__(self) -> int:
         return len(self.manoeuvres)
@@ -166,9 +167,21 @@ class Task:
     def reach(
         self, index: int, arm: PlacedArm, rotation: Array, contact: Array, way: Array
     ) -> Reach:
-        """Solve the inverse kinematics of N tool poses at the contact and off it."""
+        """Solve the inverse kinematics of N tool poses at the contact and off it.
+
+        An action is begun in many situations, most of which leave its contacts where they were.
+        """
         coarse = arm.redundancy(self.contacts[index].q[arm.arm.slice])
         values = np.append(arm.redundancies, coarse)
+        key = arm.gripper, *(part.tobytes() for part in (values, rotation, contact, way))
+        if key not in self._reaches:
+            self._reaches[key] = self._reach(arm, rotation, contact, way, values)
+        return self._reaches[key]
+
+    @staticmethod
+    def _reach(
+        arm: PlacedArm, rotation: Array, contact: Array, way: Array, values: Array
+    ) -> Reach:
         positions = np.stack([contact, contact + way], axis=1)[:, :, None]
         q, valid = arm.inverse(
             rotation[:, None, None],
