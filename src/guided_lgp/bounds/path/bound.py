@@ -172,7 +172,9 @@ class PathBound:
         """Carry out the actions from ``index`` on, or say which earlier one to change."""
         if index == len(task):
             return []
+        begun = False
         for outcome in sampler.outcomes(index, situation):
+            begun = True
             rest = self._search(task, sampler, limit, index + 1, outcome.situation)
             if isinstance(rest, list):
                 return [outcome, *rest]
@@ -180,4 +182,4 @@ class PathBound:
                 return rest
             if self._mover.queries > limit or sampler.visits > _VISITS * (len(task) + 4):
                 return -1
-        return sampler.backjump_target(index)
+        return sampler.backjump_target(index, situation, begun)

@@ -95,6 +95,11 @@ class Mover:
         self.robot = scene.robot.description
         self.arms = {g: PlacedArm(self.robot, g, base, fixed) for g in self.robot.grippers}
         self._bodies = body_names(scene)
+        self._gripper_of = {
+            link: gripper
+            for gripper, arm in self.robot.arms.items()
+            for link in (*arm.links, *arm.hand_links)
+        }
         self._checker = checker_of(scene)
         self._entered: tuple[Surroundings, JointSpace] | None = None
         self._iterations = iterations
@@ -103,6 +108,10 @@ class Mover:
     def name_of(self, pair: tuple[str, str]) -> str:
         """The constraint that two bodies in collision violate."""
         return overlap_name(*pair, self._bodies)
+
+    def symbol_of(self, name: str) -> str:
+        """The gripper of a link's arm; any other body itself."""
+        return self._gripper_of.get(name, name)
 
     @property
     def queries(self) -> int:
@@ -125,7 +134,7 @@ class Mover:
         tool: Tool,
         direction: Array,
         shift: float = 0.0,
-    ) -> Array | str:
+    ) -> Array | tuple[str, str] | None:
         """A free straight line of the tool, which does not turn.
 
         Args:
@@ -135,7 +144,7 @@ class Mover:
             shift: turn of the redundant joint (rad) on the way.
 
         Returns:
-            Configurations (m, n), or what is wrong with it.
+            Configurations (m, n); or two bodies in collision; or None, it is out of reach.
         """
         arm = self.arms[surroundings.scene.gripper]
         count = 2 + int(np.linalg.norm(direction) / LINE_STEP)
@@ -144,14 +153,13 @@ class Mover:
         q, valid = arm.inverse(tool.rotation, position, redundancy)
         path = arm.follow(q, valid, tool.branch)
         if path is None:
-            return "out of reach"
+            return None
         rotation, middle = arm.forward((path[:-1] + path[1:]) / 2)
         astray = np.abs(middle - (position[:-1] + position[1:]) / 2).max()
         turned_by = np.abs(rotation - tool.rotation).max()
         if astray > _ASTRAY or turned_by > 10 * _ASTRAY:
-            return "out of reach"
-        blocked = self.collision(surroundings, path)
-        return path if blocked is None else self.name_of(blocked)
+            return None
+        return self.collision(surroundings, path) or path
 
     def transit(
         self, surroundings: Surroundings, start: Array, goal: Array, rng: np.random.Generator

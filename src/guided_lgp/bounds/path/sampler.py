@@ -7,14 +7,15 @@ contact and the ends of the straight ways are free, then the ways, then the tran
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import islice, product
+from typing import Literal
 
 import numpy as np
 
 from guided_lgp.bounds.path.contacts import Contacts, ContactSampler
-from guided_lgp.bounds.path.motions import Motion, Tool
+from guided_lgp.bounds.path.motions import Motion, Surroundings, Tool
 from guided_lgp.bounds.path.situation import Attach, Fingers, Release, Situation, Step
 from guided_lgp.bounds.path.spaces import wound
-from guided_lgp.bounds.path.task import Choice, Outcome, Reach, Stage, Task
+from guided_lgp.bounds.path.task import Choice, Culprits, Outcome, Reach, Stage, Task
 from guided_lgp.bounds.results import Array
 from guided_lgp.poses import compose, inverse, pose, rotation_matrix, yaw_of
 
@@ -38,6 +39,7 @@ class OutcomeSampler:
     def outcomes(self, index: int, situation: Situation) -> Iterator[Outcome]:
         """Ways to carry out an action, each free of collisions from rest to rest."""
         self.visits += 1
+        self._task.culprits = Culprits()
         action = self._task.manoeuvres[index]
         others = [gripper for gripper in self._task.arms if gripper != action.gripper]
         widths = [None] if action.closing is None else self._task.widths(index)
@@ -54,23 +56,36 @@ class OutcomeSampler:
                             outcome.contact,
                         )
 
-    def backjump_target(self, index: int) -> int:
-        """The earlier action to change when none of the ways of this one works.
+    def backjump_target(self, index: int, situation: Situation, begun: bool) -> int:
+        """The earlier action to change when none of the ways of this one works; -1 for none.
 
-        What the motion depends on is how the body is held, if it is.
+        Where no way of it was found at all, that is the last action that decided on what stood
+        in its way (conflict-directed backjumping; Prosser, 1993). Where later actions failed, it
+        is the last one, or for a body in a hand the one that decided how it is held.
+
+        Args:
+            index: of the action.
+            situation: in which it was begun last.
+            begun: whether a way of it was found.
         """
-        task, body = self._task, self._task.manoeuvres[index].body
-        if task.states[index].holder(body) is None:
+        task, action = self._task, self._task.manoeuvres[index]
+        held = task.states[index].holder(action.body) is not None
+        if begun and held:
+            culprits = {action.body}
+        elif begun or task.culprits.anything or situation.loaded(action.gripper):
             return index - 1
-        return next(
-            (
-                j
-                for j in range(index - 1, -1, -1)
-                if body == task.manoeuvres[j].body
-                or body in [task.root(j, shown) for shown in task.manoeuvres[j].presented]
-            ),
-            -1,
-        )
+        else:
+            symbols = {action.body, action.parent, *action.presented, action.way_out.gripper}
+            symbols = symbols - {action.gripper} | task.culprits.symbols
+            culprits = {below for symbol in symbols for below in task.below(index, symbol)}
+        earlier = range(index - 1, -1, -1)
+        return next((j for j in earlier if not culprits.isdisjoint(self._decided(j))), -1)
+
+    def _decided(self, index: int) -> set[str]:
+        """The bodies and arms of which an action decides where they are."""
+        task, action = self._task, self._task.manoeuvres[index]
+        shown = {task.root(index, body) for body in action.presented}
+        return {action.body, action.gripper, action.way_out.gripper, *shown}
 
     def _presented(
         self, index: int, situation: Situation, bodies: Sequence[str]
@@ -110,7 +125,7 @@ class OutcomeSampler:
                 continue
             steps = task.transit(around, now, goal, loaded)
             if steps is None:
-                task.record(index, Stage.CONTACT, f"no motion found to present {body}")
+                task.unmoved(index, Stage.CONTACT, f"no motion found to present {body}")
                 continue
             yield tuple(steps), task.after(situation, steps)
 
@@ -174,9 +189,8 @@ class OutcomeSampler:
         leaving = task.arms[action.way_out.gripper]
         start, tool = situation.q[arm.arm.slice], reach.tool(choice)
         around = situation.around(gripper, [(action.body, action.parent)])
-        line = task.mover.line(around, tool, reach.way[choice[0]])
-        if isinstance(line, str):
-            task.record(index, Stage.LINE_IN, f"{line} on the way in")
+        line = self._line(index, Stage.LINE_IN, around, tool, reach.way[choice[0]])
+        if line is None:
             return None
         # Full turns of a joint move the hand in the last bit only, but what is let go of keeps it.
         held = situation.state.holder(action.body) is not None
@@ -190,7 +204,9 @@ class OutcomeSampler:
             goal = arm.near(line[-1], start)
             come = task.transit(situation.around(gripper), start, goal, situation.loaded(gripper))
             if come is None:
-                task.record(index, Stage.TRANSIT, f"no motion found to {action.name} {action.body}")
+                task.unmoved(
+                    index, Stage.TRANSIT, f"no motion found to {action.name} {action.body}"
+                )
                 return None
             inward = Motion(arm.arm, wound(line[::-1], arm, come[-1].path[-1]))
             left = task.after(switched, [inward])
@@ -208,12 +224,30 @@ class OutcomeSampler:
         around = switched.around(action.way_out.gripper, [(action.body, self._parent(index))])
         at_end = switched.around(action.way_out.gripper)
         for way, shift in product(action.way_out.ways, task.shifts(action.way_out.gripper)):
-            out = task.mover.line(around, tool, way.of(tool.rotation), shift)
-            if isinstance(out, str):
-                task.record(index, Stage.LINE_OUT, f"{out} on the way out")
-                continue
-            if not task.blocked(index, Stage.OUT, "after the contact", at_end, out[-1:]):
+            out = self._line(index, Stage.LINE_OUT, around, tool, way.of(tool.rotation), shift)
+            if out is not None and not task.blocked(
+                index, Stage.OUT, "after the contact", at_end, out[-1:]
+            ):
                 yield out
+
+    def _line(
+        self,
+        index: int,
+        stage: Literal[Stage.LINE_IN, Stage.LINE_OUT],
+        around: Surroundings,
+        tool: Tool,
+        direction: Array,
+        shift: float = 0.0,
+    ) -> Array | None:
+        """A free straight line of a tool, or None, and what is wrong with it is remembered."""
+        where = "on the way in" if stage == Stage.LINE_IN else "on the way out"
+        line = self._task.mover.line(around, tool, direction, shift)
+        if line is None:
+            self._task.record(index, stage, f"out of reach {where}")
+        elif isinstance(line, tuple):
+            self._task.collided(index, stage, line, where)
+            return None
+        return line
 
     def _switch(self, index: int, situation: Situation) -> tuple[Step, ...]:
         """Fingers close; the body and what stands on it change their carrier; fingers open."""
@@ -243,7 +277,7 @@ class OutcomeSampler:
         for gripper in grippers:
             motions = self._task.home(self._task.after(situation, steps), gripper)
             if motions is None:
-                self._task.record(index, stage, f"no motion found for {gripper} to its side")
+                self._task.unmoved(index, stage, f"no motion found for {gripper} to its side")
                 return None
             steps += motions
         return tuple(steps)

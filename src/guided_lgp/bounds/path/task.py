@@ -1,7 +1,7 @@
 """What all ways to carry out the actions of a skeleton share, and the arm's reach at a contact."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from itertools import permutations
 
@@ -22,6 +22,7 @@ from guided_lgp.scene import Scene
 _SHIFTS = (0.0, 0.25, -0.25, 0.5, -0.5)
 """Turns of the redundant joint (rad) on the straight way off a box that are tried."""
 
+_Key = tuple[str | bytes, ...]
 
 Choice = tuple[int, int, int]
 """Tool pose, value of the redundant joint, branch of the inverse kinematics."""
@@ -107,6 +108,16 @@ class Reach:
         ]
 
 
+@dataclass
+class Culprits:
+    """What the obstacles that an action met since it was begun depend on."""
+
+    symbols: set[str] = field(default_factory=set)
+    """Bodies by where they are, grippers by the posture of their arm."""
+    anything: bool = False
+    """Whether one of them may depend on all that came before: no motion was found."""
+
+
 class Task:
     """One skeleton near one coarse solution, for the search through its actions."""
 
@@ -137,7 +148,9 @@ class Task:
         for action in skeleton:
             self.states.append(successor(self.states[-1], action))
         self.start = situation_at_start(scene, goals.upright)
-        self._reaches: dict[tuple[str | bytes, ...], Reach] = {}
+        self.culprits = Culprits()
+        """Of the action begun last."""
+        self._reaches: dict[_Key, Reach] = {}
 
     def __len__(self) -> int:
         return len(self.manoeuvres)
@@ -160,6 +173,14 @@ class Task:
             return True
         return not self.goals.about(body).faults(self.scene, {**boxes, body: place})
 
+    def below(self, index: int, body: str) -> set[str]:
+        """A body and those below it, before an action: where they are says where it is."""
+        found = {body}
+        while (support := self.states[index].support_of(body)) is not None:
+            body = support
+            found.add(body)
+        return found
+
     def carrier(self, index: int, body: str) -> str | None:
         """The gripper that holds a body, or what the body stands on, before an action."""
         return self.states[index].holder(self.root(index, body))
@@ -173,15 +194,14 @@ class Task:
         """
         coarse = arm.redundancy(self.contacts[index].q[arm.arm.slice])
         values = np.append(arm.redundancies, coarse)
-        key = arm.gripper, *(part.tobytes() for part in (values, rotation, contact, way))
+        arrays = (values, rotation, contact, way)
+        key: _Key = (arm.gripper, *(array.tobytes() for array in arrays))
         if key not in self._reaches:
             self._reaches[key] = self._reach(arm, rotation, contact, way, values)
         return self._reaches[key]
 
     @staticmethod
-    def _reach(
-        arm: PlacedArm, rotation: Array, contact: Array, way: Array, values: Array
-    ) -> Reach:
+    def _reach(arm: PlacedArm, rotation: Array, contact: Array, way: Array, values: Array) -> Reach:
         positions = np.stack([contact, contact + way], axis=1)[:, :, None]
         q, valid = arm.inverse(
             rotation[:, None, None],
@@ -303,11 +323,21 @@ class Task:
         """Remember an obstacle of an action."""
         self.failure.record(index, stage, constraint)
 
+    def unmoved(self, index: int, stage: Stage, constraint: str) -> None:
+        """Remember that no motion was found, whatever stood in its way."""
+        self.culprits.anything = True
+        self.record(index, stage, constraint)
+
+    def collided(self, index: int, stage: Stage, pair: tuple[str, str], where: str) -> None:
+        """Remember two bodies in collision."""
+        self.culprits.symbols |= {self.mover.symbol_of(name) for name in pair}
+        self.record(index, stage, f"{self.mover.name_of(pair)} {where}")
+
     def blocked(
         self, index: int, stage: Stage, where: str, surroundings: Surroundings, q: Array
     ) -> bool:
         """Whether configurations (m, n) of the moving arm collide, and remember it."""
         pair = self.mover.collision(surroundings, q)
         if pair is not None:
-            self.record(index, stage, f"{self.mover.name_of(pair)} {where}")
+            self.collided(index, stage, pair, where)
         return pair is not None
