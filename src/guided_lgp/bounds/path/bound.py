@@ -25,8 +25,9 @@ _ITERATIONS = 150
 _QUERIES = 250
 """Collision queries per action (and for four more) and coarse solution: of 108 found motions, 98 %
 took less than 210, and with less effort a search that fails goes on to the next solution sooner."""
-_VISITS = 8
-"""Situations in which an action is begun, counted in the same way."""
+_VISITS = 4
+"""Situations in which an action is begun, counted in the same way: of 101 searches that found a
+motion, 98 % begun at most 1.4, one 3.7."""
 
 
 class PathBound:
