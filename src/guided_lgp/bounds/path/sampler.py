@@ -84,7 +84,7 @@ class OutcomeSampler:
     def _decided(self, index: int) -> set[str]:
         """The bodies and arms of which an action decides where they are."""
         task, action = self._task, self._task.manoeuvres[index]
-        shown = {task.root(index, body) for body in action.presented}
+        shown = {task.root(index, body) for body in action.presented} & task.boxes.keys()
         return {action.body, action.gripper, action.way_out.gripper, *shown}
 
     def _presented(
