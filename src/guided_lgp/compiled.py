@@ -8,7 +8,7 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from functools import cache
 from hashlib import sha256
@@ -48,6 +48,16 @@ logger = logging.getLogger(__name__)
 
 
 def load_compiled(name: str, source: str) -> ctypes.CDLL | None:
+    """The library made of C code; see :func:`load_generated`.
+
+    Args:
+        name: what the file's name begins with.
+        source: the code.
+    """
+    return load_generated(name, source, lambda: source)
+
+
+def load_generated(name: str, key: str, generate: Callable[[], str]) -> ctypes.CDLL | None:
     """The library made of C code, or None if it is not there and no compiler works.
 
     It lies in the private cache, is opened only if its content is the one that was written, and
@@ -55,19 +65,23 @@ def load_compiled(name: str, source: str) -> ctypes.CDLL | None:
 
     Args:
         name: what the file's name begins with.
-        source: the code.
+        key: another for other code.
+        generate: gives the code, where it has to be compiled.
 
     Raises:
         InputError: the cache folder cannot be used.
     """
-    digest = sha256("\n".join((_PRELUDE, source, sys.platform, *_FLAGS)).encode()).hexdigest()
+    digest = sha256("\n".join((_PRELUDE, key, sys.platform, *_FLAGS)).encode()).hexdigest()
     answer = int(digest[:6], 16)
-    code = f"{_PRELUDE}{source}\nint {_PROBE}(void) {{ return {answer}; }}\n"
+
+    def code() -> str:
+        return f"{_PRELUDE}{generate()}\nint {_PROBE}(void) {{ return {answer}; }}\n"
+
     commands = list(_compilers())
     file = _any_made(name, digest) if not commands else None
     if commands:
         entry = f"{name}-{platform.machine()}-{_identity(commands[0])}-{digest[:16]}.so"
-        file = made(entry, lambda folder: _make(code, commands, answer, folder))
+        file = made(entry, lambda folder: _make(code(), commands, answer, folder))
     return None if file is None else ctypes.CDLL(str(file))
 
 

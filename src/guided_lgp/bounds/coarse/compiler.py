@@ -1,15 +1,76 @@
-"""Compilation of the stage kernels with the solver's loop, once per content."""
+"""Compilation of the stage kernels with the solver's loop, once per content.
+
+The content is known by what it is made of: the sources, the arms, and the version of CasADi. So
+nothing symbolic has to be built where the library is there already.
+"""
 
 import ctypes
+import json
+import pickle
+from collections.abc import Iterator
+from dataclasses import astuple, fields
+from functools import cache
+from hashlib import sha256
+from importlib.metadata import version
 from pathlib import Path
 
 import casadi as ca
 
 from guided_lgp.bounds.program.inverse import INPUTS, closed_forms
+from guided_lgp.bounds.program.kernels import KernelShape, KernelTable
 from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.bounds.terms import kernel_table
-from guided_lgp.compiled import load_compiled
+from guided_lgp.cache import made
+from guided_lgp.compiled import load_generated
 from guided_lgp.robots import Robot
+
+_HERE = Path(__file__).parent
+_LOOP = (_HERE / "cholesky.c", _HERE / "solver.c")
+
+
+def load_library(robot: Robot) -> ctypes.CDLL | None:
+    """The compiled solver of a robot's kernels, or None if it is not there and no compiler works.
+
+    Raises:
+        InputError: the cache folder cannot be written.
+    """
+    return load_generated("coarse", _key(robot), lambda: _source(robot))
+
+
+@cache
+def kernel_shapes(robot: Robot) -> KernelTable[KernelShape]:
+    """What programs have to know of a robot's kernels.
+
+    Raises:
+        InputError: the cache folder cannot be written.
+    """
+    file = made(f"kernels-{_key(robot)[:16]}.json", lambda _: _described(robot))
+    assert file is not None
+    return KernelTable([KernelShape(*row) for row in json.loads(file.read_bytes())])
+
+
+def _described(robot: Robot) -> bytes:
+    names = [field.name for field in fields(KernelShape)]
+    table = kernel_table(kinematics_of(robot))
+    return json.dumps([[getattr(kernel, name) for name in names] for kernel in table]).encode()
+
+
+@cache
+def _key(robot: Robot) -> str:
+    """A digest of all that the code is made of."""
+    kinematics = kinematics_of(robot)
+    arms = [(a.chain.name, a.side, a.home, a.limits) for a in kinematics.arms.values()]
+    lengths = [(c.human_like and astuple(c.human_like)) for c in kinematics.chains]
+    chains = [astuple(chain) for chain in kinematics.chains]
+    content = (version("casadi"), kinematics.fixed, arms, lengths, chains)
+    return sha256(pickle.dumps(content, protocol=4) + b"".join(_sources())).hexdigest()
+
+
+def _sources() -> Iterator[bytes]:
+    folders = (_HERE.parent / "program", _HERE.parent / "terms")
+    modules = (file for folder in folders for file in sorted(folder.glob("*.py")))
+    for file in (*modules, Path(__file__), *_LOOP):
+        yield file.read_bytes()
 
 
 def _source(robot: Robot) -> str:
@@ -32,16 +93,6 @@ def _source(robot: Robot) -> str:
         "LARGEST_ROWS": max(kernel.rows for kernel in table),
         "WORK": max(1, *(function.sz_w() for function in (*functions, *forms.values()))),
     }
-    parts = (Path(__file__).with_name(name) for name in ("cholesky.c", "solver.c"))
-    loop = "\n".join(part.read_text(encoding="utf-8") for part in parts)
+    loop = "\n".join(part.read_text(encoding="utf-8") for part in _LOOP)
     defines = "\n".join(f"#define {name} {value}" for name, value in macros.items())
     return f"{generator.dump()}\n{defines}\n{loop}"
-
-
-def load_library(robot: Robot) -> ctypes.CDLL | None:
-    """The compiled solver of a robot's kernels, or None if it is not there and no compiler works.
-
-    Raises:
-        InputError: the cache folder cannot be written.
-    """
-    return load_compiled("coarse", _source(robot))

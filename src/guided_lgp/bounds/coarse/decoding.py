@@ -4,16 +4,15 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from guided_lgp.bounds.coarse.compiler import kernel_shapes
 from guided_lgp.bounds.coarse.formulation import Formulation
 from guided_lgp.bounds.coarse.solver import Solution
 from guided_lgp.bounds.program.draft import pose_values
 from guided_lgp.bounds.program.geometry import SceneGeometry
 from guided_lgp.bounds.program.grasp import in_tool
-from guided_lgp.bounds.program.kernels import SCALE, KernelTable
-from guided_lgp.bounds.program.kinematics import kinematics_of
+from guided_lgp.bounds.program.kernels import SCALE, KernelShape, KernelTable
 from guided_lgp.bounds.program.slots import HeldBox, KeyframeSlots, PlanarPose
 from guided_lgp.bounds.results import Array, Failure, Keyframe
-from guided_lgp.bounds.terms import kernel_table
 from guided_lgp.poses import compose
 
 
@@ -24,7 +23,7 @@ class Decoder:
         placed = geometry.scene.robot
         self._geometry = geometry
         self._robot = placed.description
-        self._table = kernel_table(kinematics_of(self._robot))
+        self._table = kernel_shapes(self._robot)
         self._tools = {
             gripper: placed.tool_pose(self._robot.home, gripper) for gripper in self._robot.grippers
         }
@@ -77,6 +76,6 @@ class Decoder:
         return Failure(instance.action, instance.name(row), amount / scale, "solver")
 
 
-def _amounts(table: KernelTable, number: int, values: Array, slack: float) -> Array:
+def _amounts(table: KernelTable[KernelShape], number: int, values: Array, slack: float) -> Array:
     """By how much the rows of a kernel are violated (scaled)."""
     return np.abs(values) if table[number].equality else -values - slack

@@ -14,6 +14,7 @@ from inspect import signature
 
 import numpy as np
 
+from guided_lgp.bounds.coarse.compiler import kernel_shapes
 from guided_lgp.bounds.coarse.variants import Variant
 from guided_lgp.bounds.program.arrays import Instance, Program
 from guided_lgp.bounds.program.context import LOW, Aim, Context, Line, Start
@@ -21,7 +22,7 @@ from guided_lgp.bounds.program.geometry import Margins, SceneGeometry
 from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.bounds.program.slots import ArmConfiguration, HeldBox, KeyframeSlots
 from guided_lgp.bounds.results import Array
-from guided_lgp.bounds.terms import find_term, kernel_table, term_names
+from guided_lgp.bounds.terms import find_term, term_names
 from guided_lgp.bounds.terms.apart import keep_apart
 from guided_lgp.bounds.terms.clear import keep_clear
 from guided_lgp.bounds.terms.hold import take_over
@@ -60,9 +61,9 @@ class Formulator:
             margins: distances that it keeps.
             lasting: terms that hold all the time.
         """
-        robot = kinematics_of(geometry.scene.robot.description)
+        robot = geometry.scene.robot.description
         self._domain = geometry.domain
-        self._context = Context(geometry, robot, kernel_table(robot), margins)
+        self._context = Context(geometry, kinematics_of(robot), kernel_shapes(robot), margins)
         self._at_switch: tuple[KeyframeSlots, ...] = ()
         self._after_action: tuple[KeyframeSlots, ...] = ()
         for box, gripper in geometry.scene.held.items():

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from guided_lgp.bounds.coarse.compiler import load_library
 from guided_lgp.bounds.program.arrays import Program
-from guided_lgp.bounds.program.inverse import closed_forms
+from guided_lgp.bounds.program.inverse import closed_form_arms, closed_forms
 from guided_lgp.bounds.program.kernels import Kernel, KernelTable
 from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.bounds.results import Array
@@ -99,8 +99,8 @@ class Compiled:
         self._reach = library.coarse_reach
         self._reach.restype = None
         self._reach.argtypes = [ctypes.c_int] * 3 + [ctypes.c_void_p] * 2
-        forms = closed_forms(kinematics_of(robot))
-        self._forms = {name: (i, form.numel_out()) for i, (name, form) in enumerate(forms.items())}
+        arms = closed_form_arms(kinematics_of(robot))
+        self._forms = {name: (i, 1 + len(arm.home)) for i, (name, arm) in enumerate(arms.items())}
 
     def solve(self, program: Program, values: Array, settings: Settings) -> Solution:
         """See :class:`Solver`."""
@@ -237,7 +237,7 @@ class Interpreter:
         return g, H
 
 
-def equalities(table: KernelTable, program: Program) -> NDArray[np.bool_]:
+def equalities(table: KernelTable[Kernel], program: Program) -> NDArray[np.bool_]:
     """Which rows (rows,) are equalities."""
     return np.concatenate([np.full(table[k].rows, table[k].equality) for k in program.kernel])
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from guided_lgp.bounds.program.kernels import KernelTable
+from guided_lgp.bounds.program.kernels import KernelShape, KernelTable
 from guided_lgp.bounds.results import Array
 
 Integers = NDArray[np.intc]
@@ -82,7 +82,7 @@ class Instance:
 class ProgramBuilder:
     """Collects variables, constants and kernel instances."""
 
-    def __init__(self, table: KernelTable) -> None:
+    def __init__(self, table: KernelTable[KernelShape]) -> None:
         self._table = table
         self.constants = array("d", [0.0])
         self.instances: list[Instance] = []

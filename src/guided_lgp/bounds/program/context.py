@@ -10,7 +10,7 @@ import numpy as np
 from guided_lgp.bounds.program.arrays import ProgramBuilder
 from guided_lgp.bounds.program.draft import Draft
 from guided_lgp.bounds.program.geometry import Margins, SceneGeometry
-from guided_lgp.bounds.program.kernels import KernelTable
+from guided_lgp.bounds.program.kernels import KernelShape, KernelTable
 from guided_lgp.bounds.program.kinematics import ArmKinematics, RobotKinematics
 from guided_lgp.bounds.program.slots import (
     ZERO,
@@ -55,7 +55,7 @@ class Context:
         self,
         geometry: SceneGeometry,
         robot: RobotKinematics,
-        table: KernelTable,
+        table: KernelTable[KernelShape],
         margins: Margins,
     ) -> None:
         """Begin before the first action.

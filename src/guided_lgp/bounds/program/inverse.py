@@ -17,7 +17,7 @@ from guided_lgp.bounds.program.kinematics import ArmKinematics, Chain, RobotKine
 from guided_lgp.bounds.program.slots import HeldBox
 from guided_lgp.bounds.results import Array
 from guided_lgp.robots import Robot
-from guided_lgp.robots.inverse import HumanLike, inverse_kinematics
+from guided_lgp.robots.inverse import inverse_kinematics
 
 _SHOULDER_JOINTS = 4
 """The joints that move most of the arm; the wrist turns at no cost."""
@@ -154,10 +154,10 @@ def reaches(
         fixed: values of the joints that the scene sets.
         evaluate: runs closed forms.
     """
-    forms = closed_forms(kinematics)
+    closed = closed_form_arms(kinematics)
     return {
         gripper: ClosedForm(arm, _lifted(arm.chain, fixed), evaluate)
-        if arm.chain.name in forms
+        if arm.chain.name in closed
         else General(kinematics.robot, arm, fixed)
         for gripper, arm in kinematics.arms.items()
     }
@@ -170,13 +170,16 @@ def _lifted(chain: Chain, fixed: tuple[float, ...]) -> float:
 
 
 @cache
+def closed_form_arms(kinematics: RobotKinematics) -> dict[str, ArmKinematics]:
+    """An arm of each of those chains of a robot that have a closed form, by the chain's name."""
+    arms = {arm.chain.name: arm for arm in kinematics.arms.values()}
+    return {name: arm for name, arm in arms.items() if arm.chain.human_like is not None}
+
+
+@cache
 def closed_forms(kinematics: RobotKinematics) -> dict[str, Any]:
-    """The closed forms of those chains of a robot that have one, by the chain's name."""
-    return {
-        arm.chain.name: _closed_form(arm, lengths)
-        for arm in reversed(kinematics.arms.values())
-        if (lengths := arm.chain.human_like) is not None
-    }
+    """The closed forms of these chains, as CasADi functions."""
+    return {name: _closed_form(arm) for name, arm in closed_form_arms(kinematics).items()}
 
 
 def _cost(joints: Iterable[Any], within: Iterable[Any], missing: Any, home: Iterable[Any]) -> Any:
@@ -187,7 +190,7 @@ def _cost(joints: Iterable[Any], within: Iterable[Any], missing: Any, home: Iter
     return _BEYOND * beyond + _MISSING * missing + _MOTION * motion
 
 
-def _closed_form(arm: ArmKinematics, lengths: HumanLike) -> Any:
+def _closed_form(arm: ArmKinematics) -> Any:
     """CasADi function of one closed-form inverse kinematics.
 
     Inputs (16,): pose (x, y, yaw) and height of the box; pitch, offset, depth; shoulder pan,
@@ -195,7 +198,8 @@ def _closed_form(arm: ArmKinematics, lengths: HumanLike) -> Any:
     distance back; the first joints at the arm's side.
     Outputs (8,): joint values within their limits (mirrored for a mirror image) and the cost.
     """
-    x = ca.SX.sym("x", INPUTS)
+    x, lengths = ca.SX.sym("x", INPUTS), arm.chain.human_like
+    assert lengths is not None
     position, rotation = tool_target(x[:3], x[3] + x[11], x[4:7], x[12:16], arm.chain.palm_front)
     solution = inverse(lengths, position, rotation, x[7], x[8], x[9], x[10])
     joints, (low, high) = solution[:-1], np.array(arm.limits).T

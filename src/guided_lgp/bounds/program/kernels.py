@@ -8,9 +8,9 @@ centre before an offset. All residuals are multiplied by ``SCALE`` where they ar
 one tolerance serves all. Equalities are ``c = 0``, inequalities ``c >= 0``.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import casadi as ca
 import numpy as np
@@ -20,12 +20,8 @@ SCALE = 5.0
 
 
 @dataclass(frozen=True)
-class Kernel:
-    """One kind of constraint.
-
-    ``residual`` and ``jacobian`` are CasADi functions of (x, p): arguments (inputs,) and
-    parameters (parameters,) to c (rows,) and to c and its dense Jacobian (rows, inputs).
-    """
+class KernelShape:
+    """What programs have to know of one kind of constraint."""
 
     name: str
     equality: bool
@@ -34,6 +30,16 @@ class Kernel:
     rows: int
     lengths: int
     """How many rows, the first ones, are lengths; the others are in rad."""
+
+
+@dataclass(frozen=True)
+class Kernel(KernelShape):
+    """One kind of constraint.
+
+    ``residual`` and ``jacobian`` are CasADi functions of (x, p): arguments (inputs,) and
+    parameters (parameters,) to c (rows,) and to c and its dense Jacobian (rows, inputs).
+    """
+
     residual: Any
     jacobian: Any
     independent: Any
@@ -93,18 +99,21 @@ def in_frame(yaw: Any, vector: Any) -> tuple[Any, Any]:
     return cosine * vector[0] + sine * vector[1], -sine * vector[0] + cosine * vector[1]
 
 
-class KernelTable:
-    """The kernels of one robot; their numbers are those in the solver."""
+AnyKernel = TypeVar("AnyKernel", bound=KernelShape)
 
-    def __init__(self, kernels: Sequence[Kernel]) -> None:
+
+class KernelTable(Generic[AnyKernel]):
+    """The kernels of one robot, or their shapes; their numbers are those in the solver."""
+
+    def __init__(self, kernels: Iterable[AnyKernel]) -> None:
         self.kernels = tuple(kernels)
         self.number = {kernel.name: index for index, kernel in enumerate(self.kernels)}
         """By the kernel's name."""
         self.sizes = np.array([[k.inputs, k.parameters, k.rows] for k in self.kernels])
         """(kernels, 3) numbers of inputs, parameters and rows."""
 
-    def __getitem__(self, number: int) -> Kernel:
+    def __getitem__(self, number: int) -> AnyKernel:
         return self.kernels[number]
 
-    def __iter__(self) -> Any:
+    def __iter__(self) -> Iterator[AnyKernel]:
         return iter(self.kernels)

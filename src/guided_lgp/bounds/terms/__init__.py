@@ -9,7 +9,7 @@ from functools import cache
 from importlib import import_module
 from pkgutil import iter_modules
 
-from guided_lgp.bounds.program.kernels import KernelTable
+from guided_lgp.bounds.program.kernels import Kernel, KernelTable
 from guided_lgp.bounds.program.kinematics import RobotKinematics
 from guided_lgp.bounds.terms.term import Term
 
@@ -32,6 +32,6 @@ def find_term(name: str) -> Term:
 
 
 @cache
-def kernel_table(robot: RobotKinematics) -> KernelTable:
+def kernel_table(robot: RobotKinematics) -> KernelTable[Kernel]:
     """The kernels of all terms for a robot."""
     return KernelTable([k for name in term_names() for k in find_term(name).kernels(robot)])
