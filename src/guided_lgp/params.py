@@ -257,7 +257,7 @@ def read_params(path: Path, model: type[Parameters]) -> Parameters:
         InputError: the file is missing, is not YAML, has an unknown key, a wrong type or an
             impossible value; the message names the key and what is accepted.
     """
-    return _validated(path, read_yaml(path), model)
+    return _validated(path, read_yaml(path, f"{path.name} of a clone, in its folder"), model)
 
 
 def _validated(path: Path, document: Any, model: type[Parameters]) -> Parameters:

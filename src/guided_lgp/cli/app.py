@@ -2,16 +2,40 @@
 
 import sys
 from collections.abc import Sequence
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperCommand, TyperGroup
 
 from guided_lgp import __version__
 from guided_lgp.cli import cases, checks, dashboard, files, plan, stages
 from guided_lgp.cli.running import run_program
 
+
+class _Command(TyperCommand):
+    """A command whose help shows values for options that take one: not ``<bool>`` for the rest."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        return _without_value(super().get_params(ctx))
+
+
+class _Group(TyperGroup):
+    """A group of commands, the same."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        return _without_value(super().get_params(ctx))
+
+
+def _without_value(params: list[Any]) -> list[Any]:
+    for param in params:
+        if getattr(param, "is_flag", False):
+            param.metavar = ""
+    return params
+
+
 app = typer.Typer(
     name="guided-lgp",
+    cls=_Group,
     help="Guided sequential manipulation planning: a policy learned from examples proposes the "
     "next grasp or placement, and a nonlinear program finds the motion of the robot.",
     epilog="Example: guided-lgp plan examples/three_boxes.json --goal '(on red green)'",
@@ -23,12 +47,16 @@ PIPELINE = "The paper's pipeline"
 """The panel of the help that keeps its stages apart."""
 CASES = "Cases beside it"
 """That of the families where geometry decides."""
-for group in (plan, files, checks, stages, cases):
+GROUPS = (plan, files, checks, stages, cases)
+for group in GROUPS:
     app.add_typer(group.app)
+for group in (*GROUPS, dashboard):
+    for command in group.app.registered_commands:
+        command.cls = _Command
 for module, panel in ((stages, PIPELINE), (cases, CASES)):
     for stage in module.app.registered_commands:
         stage.rich_help_panel = panel
-app.add_typer(dashboard.app, name="mlflow", rich_help_panel=PIPELINE)
+app.add_typer(dashboard.app, name="mlflow", cls=_Group, rich_help_panel=PIPELINE)
 
 
 def _show_version(asked: bool) -> None:

@@ -150,8 +150,6 @@ def view(
     from guided_lgp.bounds.plan_file import read_plan
     from guided_lgp.scene import load_scene
     from guided_lgp.scene.validate import validate_scene
-    from guided_lgp.view.live import view as serve
-    from guided_lgp.view.recording import write_recording
 
     target = destinations({"--rerun": rerun}, [file])["--rerun"]
     found = read_plan(file) if is_plan(file) else None
@@ -160,9 +158,13 @@ def view(
     if target is not None:
         if found is None:
             raise InputError(str(file), "has no motion to record", "a plan written by plan --out")
+        from guided_lgp.view.recording import write_recording
+
         write_recording(found.trajectory, scene, target, found.skeleton, found.goals)
         typer.echo(f"written: {rerun}")
         return
+    from guided_lgp.view.live import view as serve
+
     serve(
         scene,
         found.trajectory if found else None,
