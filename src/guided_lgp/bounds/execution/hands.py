@@ -62,13 +62,13 @@ def closing_rows(arm: Arm, trajectory: Trajectory, before: int, switch: int) -> 
 
 
 def opening_rows(arm: Arm, trajectory: Trajectory, switch: int, after: int) -> int:
-    """Row at which the fingers are open after a switch, before a later row."""
-    moving = _moving(arm, trajectory, switch, after)
-    if moving is None or not moving.any():
+    """Row at which the fingers are open that begin to move between a switch and a later row."""
+    moving = _moving(arm, trajectory, switch, len(trajectory.times) - 1)
+    if moving is None or not moving[: after - switch].any():
         return after
     first = int(np.argmax(moving))
     still = np.flatnonzero(~moving[first:])
-    return switch + first + int(still[0]) if len(still) else after
+    return switch + first + int(still[0]) if len(still) else len(trajectory.times) - 1
 
 
 def _moving(arm: Arm, trajectory: Trajectory, first: int, last: int) -> np.ndarray | None:
