@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from plan_checker import check
 
@@ -14,6 +15,7 @@ from guided_lgp.errors import InputError
 from guided_lgp.logic import parse_objective, parse_skeleton
 from guided_lgp.params import load_params
 from guided_lgp.paths import SOURCES
+from guided_lgp.poses import compose, pose
 from guided_lgp.scene import Scene, parse_scene
 from guided_lgp.scene.validate import validate_scene
 
@@ -60,6 +62,18 @@ def test_what_is_in_a_hand_is_put_down(
     assert check(plan) == []
     plan["scene"]["boxes"][1]["grasp"][2] += 0.01
     assert check(plan) != []
+
+
+def test_a_can_may_be_turned_in_the_hand(tmp_path: Path) -> None:
+    can = {"shape": "cylinder", "size": [0.06, 0.06, 0.12]}
+    above = next(box for box in scene(**can).movable if box.name == "blue").grasp
+    assert above is not None
+    turned = compose(np.array(above), pose((0.0, 0.0, 0.0), 0.4)).tolist()
+    start, placing = scene(**can, grasp=turned), parse_skeleton("(place pr2R blue right)")
+    result = SceneBounds(start, PARAMS).path(placing)
+    assert result.feasible, result.failure
+    write_plan(tmp_path / "plan.json", start, parse_objective(["(on blue right)"]), result, {})
+    assert check(json.loads((tmp_path / "plan.json").read_text())) == []
 
 
 @pytest.mark.parametrize(

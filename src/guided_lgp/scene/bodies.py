@@ -247,7 +247,7 @@ class Box(Solid):
         if self.fixed and self.grasps:
             raise ValueError("grasps: nobody holds a fixed body")
         for number, grasp in enumerate(self.grasp_poses):
-            fault = _grasp_fault(grasp)
+            fault = _grasp_fault(grasp, self.shape)
             if fault:
                 raise ValueError(f"grasps.{number}: {fault}")
         return self
@@ -301,10 +301,11 @@ def _unit(quaternion: Quaternion) -> Array:
     return np.array(quaternion) / length
 
 
-def _grasp_fault(grasp: Array) -> str:
+def _grasp_fault(grasp: Array, shape: Shape) -> str:
     """Why no hand can hold a standing body so: at a pose (7,) of the tool in its frame."""
     approach, closing, _ = rotation_matrix(grasp[3:]).T
-    if np.abs(closing[:2]).max() < math.cos(GRASP_ANGLE / 2):
+    across = np.hypot(*closing[:2]) if shape == "cylinder" else np.abs(closing[:2]).max()
+    if across < math.cos(GRASP_ANGLE / 2):
         return "the fingers close along neither x nor y of the body"
     if abs(closing @ grasp[:3]) > GRASP_OFFSET / 2:
         middle = 1e3 * abs(closing @ grasp[:3])

@@ -20,7 +20,7 @@ from guided_lgp.bounds.program.geometry import GraspSide, SceneGeometry
 from guided_lgp.bounds.program.kernels import absolute
 from guided_lgp.bounds.program.slots import HeldBox
 from guided_lgp.bounds.results import Array
-from guided_lgp.poses import inverse, multiply, pose
+from guided_lgp.poses import inverse, multiply, pose, rotation_matrix
 from guided_lgp.robots import Arm
 from guided_lgp.scene.tolerances import GRASP_ANGLE, GRASP_OFFSET
 
@@ -40,18 +40,28 @@ Grip = tuple[float, float, float]
 
 def grasp_sides(geometry: SceneGeometry, box: str, arm: Arm) -> tuple[GraspSide, ...]:
     """The sides of a box that a hand can close on; one for each grasp, where these are given."""
-    sides, half_height = (
-        geometry.grasp_sides(box, arm.fingers.grasp_width),
-        geometry.bodies[box].half[2],
-    )
-    body = geometry.movable[box]
+    body, half_height = geometry.movable[box], geometry.bodies[box].half[2]
     if not body.grasps:
-        return sides
+        return geometry.grasp_sides(box, arm.fingers.grasp_width)
     found = (
-        read_grip(grasp, sides, half_height, arm.palm_front, loosely=True)
+        read_grip(
+            grasp, sides_of(geometry, box, arm, grasp), half_height, arm.palm_front, loosely=True
+        )
         for grasp in inverse(body.grasp_poses)
     )
     return tuple(replace(side, given=grip) for side, grip in filter(None, found))
+
+
+def sides_of(geometry: SceneGeometry, box: str, arm: Arm, grasp: Array) -> tuple[GraspSide, ...]:
+    """The sides on which a grasp may close, a pose (7,) of the box in the tool frame.
+
+    Of a cylinder that is the one that the fingers are at.
+    """
+    sides = geometry.grasp_sides(box, arm.fingers.grasp_width)
+    if not geometry.is_round(box):
+        return sides
+    x, y, _ = rotation_matrix(inverse(grasp)[3:])[:, 1]
+    return tuple(replace(side, turn=float(np.arctan2(-x, y))) for side in sides[:1])
 
 
 def tool_target(pose: Any, height: Any, grip: Any, p: Any, palm_front: float) -> tuple[Any, Any]:

@@ -20,6 +20,7 @@ from guided_lgp.bounds.program.grasp import (
     Grip,
     grasp_sides,
     read_grip,
+    sides_of,
     tool_target,
 )
 from guided_lgp.bounds.program.kernels import SCALE, Kernel, kernel
@@ -123,8 +124,8 @@ def take_over(context: Context, gripper: str, box: str) -> None:
     """
     arm = context.robot.arms[gripper].arm
     body = context.geometry.movable[box]
-    sides = context.geometry.grasp_sides(box, arm.fingers.grasp_width)
     half_height, grasp = context.half(box)[2], np.array(body.grasp)
+    sides = sides_of(context.geometry, box, arm, grasp)
     found = read_grip(grasp, sides, half_height, arm.palm_front, loosely=bool(body.grasps))
     if found is None:
         accepted = "fingers across upright sides, the body level when the hand points down or ahead"
