@@ -58,7 +58,7 @@ def run_task(task: Task) -> tuple[dict[str, Any], float]:
     case, begin = cases(task.kind, task.number), time.perf_counter()
     result = _planned(case, CALLS)
     elapsed = time.perf_counter() - begin
-    faults = _faults(result)
+    faults = faults_of(result)
     finding = None if result.finding is None else result.finding.kind
     return {
         "kind": task.kind,
@@ -92,10 +92,10 @@ def _truth(case: Case, result: PlanningResult, faults: Sequence[object]) -> str:
     if result.solved and not faults:
         return "solvable"
     witness = _planned(case, CALLS * PATIENCE, "informed")
-    return "solvable" if witness.solved and not _faults(witness) else "undecided"
+    return "solvable" if witness.solved and not faults_of(witness) else "undecided"
 
 
-def _faults(result: PlanningResult) -> Sequence[object]:
+def faults_of(result: PlanningResult) -> Sequence[object]:
     """What the checker of the tests finds in a plan; nothing where there is none."""
     if result.path is None:
         return ()
@@ -140,11 +140,23 @@ def summary(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 def table(document: Mapping[str, Any]) -> str:
     """The figures in Markdown."""
-    heads = ["kind", *(name.replace("_", " ") for name in FIGURES)]
-    lines = [heads, ["---"] * len(heads)]
-    for kind, counts in (*document["kinds"].items(), ("all", document["all"])):
-        lines.append([kind, *(str(counts[name]) for name in FIGURES)])
+    return markdown("kind", document["kinds"] | {"all": document["all"]})
+
+
+def markdown(head: str, rows: Mapping[str, Mapping[str, int]]) -> str:
+    """A table with one row for each key and the same columns in all of them."""
+    columns = list(next(iter(rows.values())))
+    lines = [[head, *(name.replace("_", " ") for name in columns)], ["---"] * (len(columns) + 1)]
+    lines += [[name, *(str(row[column]) for column in columns)] for name, row in rows.items()]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def write_table(begin: str, text: str) -> None:
+    """Put a table into the page, between a mark and the next end."""
+    before, mark, rest = (SOURCES / PAGE).read_text(encoding="utf-8").partition(begin)
+    _, end, after = rest.partition(END)
+    with written_whole(SOURCES / PAGE) as unfinished:
+        unfinished.write_text(f"{before}{mark}\n\n{text}\n\n{end}{after}", "utf-8")
 
 
 def main(count: int = SCENES, first: int = 0) -> None:
@@ -160,10 +172,7 @@ def main(count: int = SCENES, first: int = 0) -> None:
     write_json(SOURCES / METRICS / FILE, document)
     times = {f"{row['kind']}-{row['number']}": round(seconds, 2) for row, seconds in done}
     write_json(SOURCES / METRICS / TIMES, {"seconds": _before(TIMES, "seconds", {}) | times})
-    before, begin, rest = (SOURCES / PAGE).read_text(encoding="utf-8").partition(BEGIN)
-    _, end, after = rest.partition(END)
-    with written_whole(SOURCES / PAGE) as unfinished:
-        unfinished.write_text(f"{before}{begin}\n\n{table(document)}\n\n{end}{after}", "utf-8")
+    write_table(BEGIN, table(document))
 
 
 def _before(name: str, field: str, otherwise: Known) -> Known:
