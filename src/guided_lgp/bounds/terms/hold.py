@@ -133,6 +133,7 @@ def take_over(context: Context, gripper: str, box: str) -> None:
     held = _given_grip(context, gripper, box, *found)
     context.hands[gripper] = context.held[box] = held
     context.grips.append(held)
+    context.configurations[held] = ()  # until an action adds one
 
 
 def _given_grip(context: Context, gripper: str, box: str, side: GraspSide, given: Grip) -> HeldBox:
