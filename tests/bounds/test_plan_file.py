@@ -62,6 +62,26 @@ def test_keyframes_are_rows_of_the_path(file: Path, result: PathResult) -> None:
     assert plan.fixed_joints == {"torso_lift_joint": 0.28}
 
 
+def test_a_grip_has_its_force_and_how_far_the_fingers_close(file: Path) -> None:
+    plan = read_plan(file)
+    (grip,) = plan.grips
+    (attachment,) = plan.path.attachments
+    assert (grip.box, grip.gripper, grip.start) == ("red", "pr2L", attachment.start)
+    assert grip.width == 0.07
+    fingers = SCENE.robot.description.arms["pr2L"].fingers
+    assert 0.06 < fingers.opening(grip.closing) < grip.width
+    assert 40.0 <= grip.force <= fingers.force
+    assert 0.0 < grip.ratio <= 0.5
+
+
+def test_a_plan_without_grips_is_read(file: Path) -> None:
+    """As older versions have written them."""
+    document = json.loads(file.read_text())
+    del document["grips"]
+    file.write_text(json.dumps(document))
+    assert read_plan(file).grips == ()
+
+
 def test_writing_twice_gives_the_same_bytes_and_leaves_nothing_else(
     file: Path, result: PathResult
 ) -> None:

@@ -14,6 +14,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field, ValidationError, model_validator
 
+from guided_lgp.bounds.execution.forces import Grip, grips_of
 from guided_lgp.bounds.results import Attachment, Keyframe, PathResult, Trajectory
 from guided_lgp.bounds.verify.attachments import switches_of
 from guided_lgp.documents import read_json, write_text
@@ -62,6 +63,23 @@ class PlanPath(Document):
     attachments: tuple[PlanAttachment, ...]
 
 
+class PlanGrip(Document):
+    """What a gripper is told to hold a box from its grasp on."""
+
+    box: str
+    gripper: str
+    start: Index
+    """Row of ``path`` at which it has closed."""
+    width: Annotated[float, Field(gt=0, le=10)]
+    """m of the side that the fingers close across."""
+    closing: Finite
+    """Value (rad or m) of the finger joints to close to: within the box, at which they stop."""
+    force: Annotated[float, Field(gt=0, le=1000)]
+    """N from either side."""
+    ratio: Annotated[float, Field(ge=0, allow_inf_nan=False)]
+    """Largest share of what the pads can carry that box and riders take, at a friction of 0.6."""
+
+
 class Plan(Document):
     """The whole file."""
 
@@ -72,6 +90,8 @@ class Plan(Document):
     fixed_joints: dict[str, Finite]
     keyframes: tuple[PlanKeyframe, ...]
     path: PlanPath
+    grips: tuple[PlanGrip, ...] = ()
+    """One for each time that a gripper holds a box; plans of older versions have none."""
     statistics: dict[str, Any]
     verification: dict[str, Any]
     physics: dict[str, Any]
@@ -118,6 +138,11 @@ class Plan(Document):
                 )
             if not attachment.start <= attachment.end < rows:
                 raise ValueError(f"attachment of {attachment.box} lies outside path.times")
+        for grip in self.grips:
+            if grip.box not in symbols.boxes or grip.gripper not in symbols.grippers:
+                raise ValueError(f"grip of unknown box or gripper: {grip.box} {grip.gripper}")
+            if grip.start >= rows:
+                raise ValueError(f"grip of {grip.box} lies outside path.times")
         for text in self.objective:
             symbols.domain.goal_type(Goal.parse(text))
         for text in self.actions:
@@ -167,6 +192,9 @@ def write_plan(
             "q": rows.tolist(),
             "attachments": [vars(attachment) for attachment in trajectory.attachments],
         },
+        "grips": [
+            _rounded(grip) for grip in grips_of(scene, result.skeleton, switches, trajectory)
+        ],
         "statistics": dict(statistics),
         "verification": dict(result.verification),
         "physics": dict(physics or {}),
@@ -190,6 +218,10 @@ def read_plan(path: Path) -> Plan:
         return Plan.model_validate(document)
     except ValidationError as error:
         raise first_fault(error, str(path)) from None
+
+
+def _rounded(grip: Grip) -> dict[str, object]:
+    return {k: round(v, _DECIMALS) if isinstance(v, float) else v for k, v in vars(grip).items()}
 
 
 def _boxes(keyframe: Keyframe) -> dict[str, object]:

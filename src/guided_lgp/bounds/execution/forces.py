@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from guided_lgp.bounds.checks import box_sizes, closing_axis, volumes
+from guided_lgp.bounds.checks import box_bodies, box_sizes, closing_axis, volumes
 from guided_lgp.bounds.results import Array, Attachment, Trajectory
 from guided_lgp.bounds.verify.attachments import spans
 from guided_lgp.bounds.verify.efforts import GRAVITY, Carried, carried_boxes, derivatives
@@ -18,7 +18,7 @@ FRICTION = 0.6
 """Coefficient of friction that grips are made for: cardboard on rubber."""
 RATIO = 0.5
 """Share of what the pads can carry that a load may take; at 0.72 boxes turned in the hand."""
-LEAST = 20.0
+LEAST = 40.0
 """N: softer grips are not worth their risk."""
 SQUEEZE = 0.004
 """How far (m) beyond the sides of a box fingers are told to close: they stop at the box."""
@@ -48,8 +48,9 @@ def grips_of(
     """The grips of a plan, in their order.
 
     The pads carry a force of 2 mu N and a torque of 2 mu N r about the closing axis, with r the
-    mean distance of a pad's points from its middle. The force N is the least with which the load,
-    its weight and what accelerates it, takes ``RATIO`` of that, within what the fingers can.
+    mean distance of a pad's points from its middle, less where pads reach over an edge. The force
+    N is the least with which the load, its weight and what accelerates it, takes ``RATIO`` of that,
+    within what the fingers can.
 
     Args:
         scene: the initial configuration.
@@ -67,10 +68,11 @@ def grips_of(
         fingers = robot.arms[span.gripper].fingers
         own = next(load for load in loads if load.span.box == span.box and _during(load, span))
         across = closing_axis(IDENTITY.tolist(), inverse(own.grip).tolist())
-        width = box_sizes(scene)[span.box][across]
+        width = float(box_sizes(scene)[span.box][across])
         riders = [load for load in loads if load.span.gripper == span.gripper]
         riders = [load for load in riders if _during(load, span)]
-        need = _need(scene, tools[span.gripper], trajectory.times, riders, fingers.pad)
+        radius = fingers.pad * _share_on_box(scene, own, across, fingers.pad)
+        need = _need(scene, tools[span.gripper], trajectory.times, riders, radius)
         force = float(np.clip(need / RATIO, LEAST, max(fingers.force, LEAST)))
         closing = fingers.value(width - SQUEEZE)
         ratio = need / force
@@ -83,7 +85,18 @@ def _during(load: Carried, span: Attachment) -> bool:
     return load.span.start < span.end and load.span.end > span.start
 
 
-def _need(scene: Scene, tools: Array, times: Array, loads: Sequence[Carried], pad: float) -> float:
+def _share_on_box(scene: Scene, load: Carried, across: int, pad: float) -> float:
+    """How much of a square pad lies on the side of the box that it presses on; a tenth at least."""
+    middle = inverse(load.grip)[:3]
+    half, touched = pad / np.sqrt(2), box_bodies(scene)[load.span.box].side(across)
+    axes = [axis for axis in range(3) if axis != across]
+    over = np.array([touched[axis] - abs(middle[axis]) + half for axis in axes])
+    return float(max(0.1, np.prod(np.clip(over / (2 * half), 0.0, 1.0))))
+
+
+def _need(
+    scene: Scene, tools: Array, times: Array, loads: Sequence[Carried], radius: float
+) -> float:
     """The force (N) at which pads just hold their loads, along a motion of the tool (T, 7)."""
     pulls, torques = np.zeros((2, len(tools), 3))
     for load in loads:
@@ -97,5 +110,5 @@ def _need(scene: Scene, tools: Array, times: Array, loads: Sequence[Carried], pa
     closing = rotate(tools[:, 3:], np.array([0.0, 1.0, 0.0]))
     along = np.sum(pulls * closing, axis=1)
     sideways = np.linalg.norm(pulls - along[:, None] * closing, axis=1)
-    twist = np.abs(np.sum(torques * closing, axis=1)) / pad
+    twist = np.abs(np.sum(torques * closing, axis=1)) / radius
     return float(np.maximum(sideways, twist).max(initial=0.0)) / (2 * FRICTION)

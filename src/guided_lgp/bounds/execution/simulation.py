@@ -23,8 +23,9 @@ _FINGER_FORCE, _FIXED_FORCE = 100.0, 1e5
 """Largest force (N or Nm) of the joints of hands, and of those that the scene fixes."""
 _STRONGEST = 1000.0
 """Nm of joints whose effort nobody limits."""
-_SQUEEZING = 0.2
-"""Speed (m/s) of fingertips that press until something stops them."""
+_CENTRED = 2e-4
+"""How far (m) beyond their middle fingers that press want to be: one motor moves them all, so that
+whatever they hold stays in the middle."""
 _TIP_TORQUE = 0.05
 """Nm: fingertips that hang on fingers turn until they lie flat on what they hold."""
 
@@ -36,7 +37,7 @@ class Simulation:
         self.world = world
         self._client = world.client
         self._robot = world.scene.robot.description
-        self._squeezing: set[str] = set()
+        self._squeezing: dict[str, float] = {}
         pybullet.setGravity(0, 0, -GRAVITY, physicsClientId=self._client)
         pybullet.setPhysicsEngineParameter(
             fixedTimeStep=1 / RATE, numSolverIterations=ITERATIONS, physicsClientId=self._client
@@ -100,25 +101,13 @@ class Simulation:
 
     def squeeze(self, gripper: str, force: float) -> None:
         """Let the fingers press with a force (N) from now on, whatever the motion says."""
-        self._squeezing.add(gripper)
+        self._squeezing[gripper] = force
         self._share_motors()
-        fingers, parts = self._robot.arms[gripper].fingers, parts_of(self._robot, gripper)
-        inwards = np.sign(fingers.closed - fingers.opened) * np.sign(fingers.ratios)
-        signs = dict(zip(fingers.joints, inwards.tolist(), strict=True))
-        for joint in parts.pressing:
-            pybullet.setJointMotorControl2(
-                self.world.robot,
-                self.world.joints[joint],
-                pybullet.VELOCITY_CONTROL,
-                targetVelocity=signs[joint] * _SQUEEZING / fingers.lever,
-                force=force * fingers.lever,
-                physicsClientId=self._client,
-            )
         self.rest(GRIP_S)
 
     def relax(self, gripper: str) -> None:
         """Let the fingers follow the motion again."""
-        self._squeezing.discard(gripper)
+        del self._squeezing[gripper]
         self._share_motors()
 
     def put(self, box: str, placement: Array) -> None:
@@ -209,7 +198,28 @@ class Simulation:
             _TIP_TORQUE if names[i] in hanging else float(self._motors[i]) for i in self._driven
         ]
 
+    def _press(self, gripper: str, force: float) -> None:
+        """Close all fingers of a hand on what stops them."""
+        fingers, parts = self._robot.arms[gripper].fingers, parts_of(self._robot, gripper)
+        ratios = dict(zip(fingers.joints, fingers.ratios.tolist(), strict=True))
+        numbers = [self.world.joints[joint] for joint in parts.pressing]
+        states = pybullet.getJointStates(self.world.robot, numbers, physicsClientId=self._client)
+        values = [s[0] / ratios[joint] for s, joint in zip(states, parts.pressing, strict=True)]
+        inwards = np.sign(fingers.closed - fingers.opened) * _CENTRED / fingers.lever
+        wanted = float(np.mean(values) + inwards)
+        pybullet.setJointMotorControlArray(
+            self.world.robot,
+            numbers,
+            pybullet.POSITION_CONTROL,
+            targetPositions=[ratios[joint] * wanted for joint in parts.pressing],
+            forces=[force * fingers.lever] * len(numbers),
+            positionGains=[0.3] * len(numbers),
+            physicsClientId=self._client,
+        )
+
     def _drive(self, velocity: Array) -> None:
+        for gripper, force in self._squeezing.items():
+            self._press(gripper, force)
         pybullet.setJointMotorControlArray(
             self.world.robot,
             self._numbers,
