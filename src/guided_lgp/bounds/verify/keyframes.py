@@ -15,7 +15,7 @@ from guided_lgp.bounds.checks import (
 )
 from guided_lgp.bounds.results import Array, Keyframe
 from guided_lgp.bounds.terms import carried
-from guided_lgp.bounds.terms.carried import Relative, relative
+from guided_lgp.bounds.terms.carried import relative
 from guided_lgp.bounds.verify.geometry import declared, grasp_faults, placement_faults
 from guided_lgp.logic import Action, Skeleton, State, successor
 from guided_lgp.robots import Robot
@@ -40,25 +40,28 @@ def verify_keyframe(
     Returns:
         What is violated; nothing if the keyframe is good.
     """
+    return _faults(world, _Reached(world, keyframe), state, action)
+
+
+def _faults(
+    world: World, reached: "_Reached", state: State, action: Action | None
+) -> list[Violation]:
+    """What is violated in a keyframe to which the world has been set."""
+    if not reached.is_finite:
+        return [Violation("finite pose", math.nan)]
     after = state if action is None else successor(state, action)
     held = tuple(dict.fromkeys((*state.held, *after.held)))
     support = dict(state.support) | dict(after.support)
     convex, robot = box_bodies(world.scene), world.scene.robot.description
     given = given_grasps(world.scene)
-    boxes = {name: keyframe.boxes[name].tolist() for name in convex}
-    if not math.isfinite(sum(map(sum, boxes.values()))):
-        return [Violation("finite pose", math.nan)]
-    violations = joint_limit_faults(robot, keyframe.q)
-    world.set(keyframe.q, keyframe.boxes)
-    if held:
-        tools = world.tool_poses(gripper for _, gripper in held).tolist()
-        for (box, gripper), tool in zip(held, tools, strict=True):
-            arm = robot.arms[gripper]
-            width = convex[box].size[closing_axis(boxes[box], tool)]
-            keeps = (box, gripper) in state.held and (box, gripper) in after.held
-            value = arm.fingers.value if keeps else arm.fingers.value_around
-            world.set_fingers({gripper: value(width)})
-            violations += grasp_faults(arm, box, convex[box], boxes[box], tool, given.get(box))
+    boxes, violations = reached.boxes, joint_limit_faults(robot, reached.q)
+    for box, gripper in held:
+        arm, tool = robot.arms[gripper], reached.tools[gripper]
+        width = convex[box].size[closing_axis(boxes[box], tool)]
+        keeps = (box, gripper) in state.held and (box, gripper) in after.held
+        value = arm.fingers.value if keeps else arm.fingers.value_around
+        world.set_fingers({gripper: value(width)})
+        violations += grasp_faults(arm, box, convex[box], boxes[box], tool, given.get(box))
     violations += placement_faults(world.scene, boxes, support)
     bodies = body_names(world.scene)
     violations += [
@@ -95,16 +98,13 @@ def verify_keyframes(
     start = Keyframe(world.scene.robot.description.home, poses_at_side(world.scene))
     for action in skeleton[:verified]:
         state = successor(state, action)
-    before = after_action[verified - 1] if verified else start
-    world.set(before.q, before.boxes)
-    last = _Frames(world, before)
+    last = _Reached(world, after_action[verified - 1] if verified else start)
     for index, action in enumerate(skeleton[verified:], verified):
         after = successor(state, action)
         moves = ((at_switch[index], state, action), (after_action[index], after, None))
         for keyframe, modes, contact in moves:
-            found = verify_keyframe(world, keyframe, modes, contact)
-            reached = _Frames(world, keyframe)
-            found = found or _slips(last, reached, modes)
+            reached = _Reached(world, keyframe)
+            found = _faults(world, reached, modes, contact) or _slips(last, reached, modes)
             if found:
                 return Violation(found[0].constraint, found[0].amount, index)
             last = reached
@@ -125,26 +125,31 @@ def joint_limit_faults(robot: Robot, q: Array) -> list[Violation]:
     return []
 
 
-class _Frames:
-    """Where boxes and tools are in a keyframe that the world has just been set to."""
+class _Reached:
+    """A keyframe to which the world is set, and where boxes and tools are then."""
 
     def __init__(self, world: World, keyframe: Keyframe) -> None:
-        grippers = world.scene.robot.description.grippers
-        tools = world.tool_poses(grippers).tolist()
-        self.frames: dict[str, list[float]] = dict(zip(grippers, tools, strict=True))
+        self.q = keyframe.q
         self.boxes = {name: placement.tolist() for name, placement in keyframe.boxes.items()}
-        self.frames |= self.boxes
+        self.is_finite = math.isfinite(sum(map(sum, self.boxes.values())))
+        self.tools: dict[str, list[float]] = {}
+        if self.is_finite:
+            world.set(keyframe.q, keyframe.boxes)
+            grippers = world.scene.robot.description.grippers
+            self.tools = dict(zip(grippers, world.tool_poses(grippers).tolist(), strict=True))
 
-    def relative(self, box: str, carrier: str) -> Relative:
-        """Where the box is in its carrier."""
-        return relative(self.boxes[box], self.frames.get(carrier))
+    def carrier(self, name: str) -> list[float] | None:
+        """The pose of a tool or box; of what never moves, none."""
+        return self.tools.get(name) or self.boxes.get(name)
 
 
-def _slips(last: _Frames, reached: _Frames, state: State) -> list[Violation]:
+def _slips(last: _Reached, reached: _Reached, state: State) -> list[Violation]:
     """Boxes that moved relative to what holds or supports them in this mode."""
     found = []
     for box, carrier in (*state.held, *state.support):
-        amount = carried.check(last.relative(box, carrier), reached.relative(box, carrier))
+        before = last.boxes[box], last.carrier(carrier)
+        now = reached.boxes[box], reached.carrier(carrier)
+        amount = 0.0 if before == now else carried.check(relative(*before), relative(*now))
         if amount > 0:
             found.append(Violation(f"carried {box} {carrier}", amount))
     return found
