@@ -126,7 +126,8 @@ def test_results_are_kept_and_damaged_ones_made_again(tmp_path: Path) -> None:
     assert run_kept(double, tasks, tmp_path, settings, "demonstrate", "doubling") == [0, 2, 4]
     files = sorted(tmp_path.iterdir())
     kept = {file: file.stat().st_mtime_ns for file in files}
-    files[0].write_text("{")
+    files[0].write_text(files[0].read_text().replace('"result": ', '"result": 1'))
+    (tmp_path / "of-another-program").mkdir()
     assert run_kept(double, tasks[:2], tmp_path, settings, "demonstrate", "doubling") == [0, 2]
     left = sorted(tmp_path.iterdir())
     assert len(left) == 2

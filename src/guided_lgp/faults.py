@@ -1,14 +1,16 @@
 """Faults that pydantic finds in a document, told in words of our own: one line with its field."""
 
 import reprlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from difflib import get_close_matches
-from typing import Any
+from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 from pydantic_core import ErrorDetails
 
 from guided_lgp.errors import InputError
+
+Valid = TypeVar("Valid")
 
 _WORDS: Mapping[str, str] = {
     "missing": "is missing",
@@ -68,20 +70,35 @@ def refuse_unknown(data: Iterable[str], fields: Iterable[str]) -> None:
             raise ValueError(f"unknown field {brief(field)} ({hint})")
 
 
-def first_fault(
-    error: ValidationError, where: str, accepted: str = "", within: str = ""
-) -> InputError:
-    """The first fault that was found in a document, in one line with its field.
-
-    Args:
-        error: what pydantic raised.
-        where: the file.
-        accepted: where such a file comes from.
-        within: the field that holds the document.
-    """
+def _first_fault(error: ValidationError, where: str, accepted: str, within: str) -> InputError:
     first = error.errors(include_url=False)[0]
     field = ".".join(map(str, (within, *first["loc"]) if within else first["loc"]))
     return InputError(f"{where}: {field}" if field else where, words(first), accepted)
+
+
+def validated(
+    validate: Callable[[Any], Valid],
+    document: Any,
+    where: str,
+    accepted: str = "",
+    within: str = "",
+) -> Valid:
+    """What a document holds: the one way to validate it.
+
+    Args:
+        validate: of a pydantic model or type, what validates a Python value.
+        document: what was read.
+        where: the file, for the message.
+        accepted: where such a file comes from.
+        within: the field that holds the document.
+
+    Raises:
+        InputError: the first fault found, in one line with its field.
+    """
+    try:
+        return validate(document)
+    except ValidationError as error:
+        raise _first_fault(error, where, accepted, within) from None
 
 
 def words(fault: ErrorDetails) -> str:

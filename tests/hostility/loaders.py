@@ -15,7 +15,14 @@ from outputs import write_outputs
 from own_robot import describe, document, written
 
 from guided_lgp.bounds.plan_file import read_plan, write_plan
-from guided_lgp.documents import read_json, read_yaml
+from guided_lgp.cases import collect
+from guided_lgp.cases.outcomes import outcomes_of, times_of
+from guided_lgp.cases.policies import RIVALS, demonstrations_of
+from guided_lgp.cases.replay import longest_plan
+from guided_lgp.cases.shards import read_kept, write_kept
+from guided_lgp.cases.train import load_demonstrations, shuffled
+from guided_lgp.documents import read_json, read_yaml, write_json
+from guided_lgp.domains import load_domain
 from guided_lgp.logic import (
     format_objective,
     parse_objective,
@@ -23,12 +30,22 @@ from guided_lgp.logic import (
     two_goal_objectives,
 )
 from guided_lgp.logic.objectives import check_objective
-from guided_lgp.params import Params, load_planning, read_params
-from guided_lgp.paths import EVALUATION, EXAMPLES, METRICS, MODELS, SCENES, SEQUENCES, TRAINING
+from guided_lgp.params import Params, load_params, load_planning, read_params
+from guided_lgp.paths import (
+    EVALUATION,
+    EXAMPLES,
+    METRICS,
+    MODELS,
+    REPORTS,
+    SCENES,
+    SEQUENCES,
+    TRAINING,
+)
 from guided_lgp.planning import plan
 from guided_lgp.policy.paper.dataset import Dataset, load_dataset
 from guided_lgp.policy.paper.samples import build_dataset
 from guided_lgp.policy.registry import load_policy
+from guided_lgp.policy.tensors import read_tensors, write_tensors
 from guided_lgp.report import analysis, tables
 from guided_lgp.report.inputs import load_inputs
 from guided_lgp.report.scalability_tables import scalability
@@ -46,6 +63,8 @@ from hostility import spoiling
 from hostility.spoiling import Spoiler
 
 ROOT = Path(__file__).parents[2]
+PARAMS = load_params(ROOT / "params.yaml")
+CASE = "rows"
 GOALS = (
     "(on red green)",
     "(held blue)",
@@ -159,6 +178,22 @@ class Examples:
         return folder
 
     @cached_property
+    def case(self) -> Path:
+        """A case: some demonstrations, the rows of two problems, and a result that is kept."""
+        folder = self._new("case")
+        arrays = read_tensors(demonstrations_of(ROOT, CASE), "make cases")
+        few = {name: array[::50] for name, array in arrays.items()}
+        write_tensors(demonstrations_of(folder, CASE), few)
+        for training in (RIVALS, *map(str, PARAMS.cases[CASE].seeds)):
+            for file in (outcomes_of, times_of):
+                rows = read_json(file(ROOT, CASE, training))
+                first = dict.fromkeys(row["scene"] for row in rows)
+                two = [row for row in rows if row["scene"] in list(first)[:2]]
+                write_json(file(folder, CASE, training), two)
+        write_kept(folder / "kept.json", [{"numbers": [1, 2.5, None], "name": "red"}])
+        return folder
+
+    @cached_property
     def sequences(self) -> Path:
         """Scenes, the tables of their enumeration as if one action were feasible, a data set."""
         folder = self._new("sequences")
@@ -207,7 +242,12 @@ def _verdict(scene: Scene, box: str) -> dict[str, object]:
 def loaders(folder: Path) -> tuple[Loader, ...]:
     """All of them, with good files below a folder."""
     examples = Examples(folder)
-    return (*_documents(examples), *_arrays(examples), *_stage_files(examples))
+    return (
+        *_documents(examples),
+        *_arrays(examples),
+        *_stage_files(examples),
+        *_case_files(examples),
+    )
 
 
 def _documents(examples: Examples) -> Iterator[Loader]:
@@ -289,6 +329,32 @@ def _stage_files(examples: Examples) -> Iterator[Loader]:
     yield Loader("report", folder, files, _report, 0.2)
     lock = ("dvc.lock",)
     yield Loader("dvc.lock", examples.parameters, lock, lambda f: read_lock(f / "dvc.lock"), 0.1)
+
+
+def _case_files(examples: Examples) -> Iterator[Loader]:
+    folder = examples.case
+    demonstrations = demonstrations_of(Path(), CASE)
+    yield Loader("demonstrations", folder, (str(demonstrations),), _labels)
+    reports = REPORTS / CASE
+    rows = tuple(
+        str(file.relative_to(folder)) for file in sorted((folder / reports).rglob("*.json"))
+    )
+    yield Loader("rows of a case", folder, rows, _collected)
+    first = outcomes_of(Path(), CASE, PARAMS.cases[CASE].seeds[0])
+    longest = partial(longest_plan, PARAMS, name=CASE)
+    yield Loader("plan of a case", folder, (str(first),), lambda f: longest(root=f), 0.1)
+    yield Loader("kept result", folder, ("kept.json",), lambda f: read_kept(f / "kept.json"), 0.3)
+
+
+def _labels(folder: Path) -> object:
+    found = load_demonstrations(folder, CASE, load_domain(PARAMS.cases[CASE].domain))
+    return shuffled(found, np.random.default_rng(0))
+
+
+def _collected(folder: Path) -> object:
+    rows = collect.read_rows(folder, CASE, PARAMS.cases[CASE])
+    figures = [collect.by_cell({CASE: rows}, part) for part in (collect.figures, collect.times)]
+    return json.dumps([*figures, collect.compared(rows)], allow_nan=False)
 
 
 def _sequences(folder: Path) -> object:

@@ -12,13 +12,13 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
 from guided_lgp.bounds.execution.forces import Grip, grips_of
 from guided_lgp.bounds.results import Attachment, Keyframe, PathResult, Trajectory
 from guided_lgp.bounds.verify.attachments import switches_of
 from guided_lgp.documents import read_json, write_text
-from guided_lgp.faults import Document, first_fault
+from guided_lgp.faults import Document, validated
 from guided_lgp.logic import Action, Goal, Objective, Skeleton
 from guided_lgp.poses import yaw_of
 from guided_lgp.scene import Scene
@@ -214,10 +214,7 @@ def read_plan(path: Path) -> Plan:
             field and the fault.
     """
     document = read_json(path, "a plan as written by guided-lgp plan --out")
-    try:
-        return Plan.model_validate(document)
-    except ValidationError as error:
-        raise first_fault(error, str(path)) from None
+    return validated(Plan.model_validate, document, str(path))
 
 
 def _rounded(grip: Grip) -> dict[str, object]:

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from guided_lgp.cases.outcomes import Row, read_timed, require_same_problems
 from guided_lgp.cases.policies import RIVALS
-from guided_lgp.documents import read_json, write_json
+from guided_lgp.documents import write_json
 from guided_lgp.params import Case, Params
 from guided_lgp.paths import REPORTS
 
@@ -17,7 +18,6 @@ TIMES = REPORTS / "cases_timing.json"
 COMPARED = REPORTS / "cases_compared.json"
 POLICY = "relational_best_first"
 """The planner that is compared with the rivals: they are complete, and so is it."""
-Row = dict[str, Any]
 Figures = dict[str, dict[str, dict[str, Row]]]
 """By case, size and planner."""
 
@@ -34,18 +34,13 @@ def read_rows(root: Path, name: str, case: Case) -> list[Row]:
     """One row per problem, planner and training, times included.
 
     Raises:
-        InputError: an evaluation is missing; the message names the command.
+        InputError: an evaluation is missing or damaged, or is of other problems than the others.
     """
     found = []
     for training in (RIVALS, *map(str, case.seeds)):
-        remedy = f"the output of evaluate_case --case {name} --training {training}"
-        folder = root / REPORTS / name
-        rows = read_json(folder / f"{training}.json", remedy)
-        seconds = read_json(folder / "times" / f"{training}.json", remedy)
-        found += [
-            {**row, "training": training, "time_s": time["time_s"]}
-            for row, time in zip(rows, seconds, strict=True)
-        ]
+        found += read_timed(root, name, training)
+    wanted = {(str(seed), POLICY) for seed in case.seeds}
+    require_same_problems(found, str(root / REPORTS / name), wanted)
     return found
 
 

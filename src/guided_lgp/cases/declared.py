@@ -4,12 +4,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from pydantic import ValidationError
 
 from guided_lgp.cases.policies import FULL, SIGHTS
 from guided_lgp.domains import domain_names
 from guided_lgp.errors import InputError
-from guided_lgp.faults import first_fault
+from guided_lgp.faults import validated
 from guided_lgp.logic import Objective
 from guided_lgp.params import Case, Params
 from guided_lgp.paths import PARAMS
@@ -67,10 +66,7 @@ def declared_case(params: Params, name: str) -> DeclaredCase:
         raise InputError(f"{where}.domain", fault, ", ".join(domain_names()))
     load_robot(case.robot)
     family = find_family(case.family, f"{where}.family")
-    try:
-        layout = family.layout.model_validate(case.layout)
-    except ValidationError as error:
-        raise first_fault(error, f"{where}.layout") from None
+    layout = validated(family.layout.model_validate, case.layout, f"{where}.layout")
     controls = [control for control in SIGHTS if control != FULL]
     for control in case.controls:
         if control not in controls:

@@ -14,6 +14,7 @@ from guided_lgp.bounds.execution import execute
 from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.cases.declared import DeclaredCase, declared_case
 from guided_lgp.cases.demonstrate import CoarseBounds
+from guided_lgp.cases.outcomes import Row, outcomes_of, times_of
 from guided_lgp.cases.policies import RIVALS, models_of, trained_with
 from guided_lgp.cases.shards import run_kept
 from guided_lgp.documents import write_json
@@ -26,7 +27,6 @@ from guided_lgp.search.planners import CASE_PLANNERS, UNIFORM, Planner
 from guided_lgp.search.policy import Policy
 from guided_lgp.search.problem import Problem
 
-Row = dict[str, Any]
 COUNTS = ("coarse_calls", "infeasible_calls", "part_calls", "failed_candidates")
 
 logger = logging.getLogger(__name__)
@@ -68,9 +68,8 @@ def run(params: Params, root: Path, name: str, training: str) -> None:
         }
         for row in rows
     ]
-    folder = root / "reports" / name
-    write_json(folder / f"{training}.json", rows)
-    write_json(folder / "times" / f"{training}.json", times)
+    write_json(outcomes_of(root, name, training), rows)
+    write_json(times_of(root, name, training), times)
     solved = sum(row["solved"] for row in rows)
     logger.info("%s, %s: %d of %d solved", name, training, solved, len(rows))
 

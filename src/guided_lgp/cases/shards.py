@@ -1,20 +1,27 @@
 """Results that survive a kill: one file per task, named after all that it depends on."""
 
 import json
+import logging
+import os
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
+from pydantic import BaseModel
+
 from guided_lgp import parallel
-from guided_lgp.documents import read_json, write_json
+from guided_lgp.documents import read_json, remove, write_json
 from guided_lgp.errors import InputError
+from guided_lgp.faults import validated
 from guided_lgp.params import Parallel
 from guided_lgp.paths import CASES
 from guided_lgp.sources import source_digest
 
 Task = TypeVar("Task")
+
+logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -22,6 +29,13 @@ class _Kept(Generic[Task]):
     function: Callable[[Task], Any]
     task: Task
     file: Path
+
+
+class _Document(BaseModel):
+    """A result, with the digest of what was written."""
+
+    digest: str
+    result: Any
 
 
 def run_kept(
@@ -47,18 +61,42 @@ def run_kept(
     wanted = {one.file for one in kept}
     for other in folder.iterdir() if folder.is_dir() else ():
         if other not in wanted:
-            other.unlink()
+            remove(other)
     parallel.run(_write, kept, settings, description)
-    return [read_json(one.file, description) for one in kept]
+    return [read_kept(one.file) for one in kept]
 
 
 def _write(kept: _Kept[Any]) -> None:
+    """Compute a result, unless it is there whole."""
     try:
-        read_json(kept.file, "")
+        read_kept(kept.file)
     except InputError:
-        write_json(kept.file, kept.function(kept.task))
+        if os.path.lexists(kept.file):
+            logger.warning("%s is damaged and computed again", kept.file)
+            remove(kept.file)
+        write_kept(kept.file, kept.function(kept.task))
+
+
+def write_kept(file: Path, result: Any) -> None:
+    """Keep a result, with its digest."""
+    write_json(file, {"digest": _digest(result), "result": result})
+
+
+def read_kept(file: Path) -> Any:
+    """A result that was kept.
+
+    Raises:
+        InputError: the file is missing or damaged.
+    """
+    document = validated(_Document.model_validate, read_json(file), str(file))
+    if document.digest != _digest(document.result):
+        raise InputError(str(file), "is damaged: its digest is another")
+    return document.result
+
+
+def _digest(content: Any) -> str:
+    return sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
 def _name(content: Any, sources: str) -> str:
-    text = json.dumps([content, sources], sort_keys=True)
-    return sha256(text.encode()).hexdigest()[:24] + ".json"
+    return _digest([content, sources])[:24] + ".json"

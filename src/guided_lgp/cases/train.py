@@ -15,15 +15,27 @@ from guided_lgp.cases.policies import (
     trained_with,
 )
 from guided_lgp.domains import load_domain
+from guided_lgp.errors import InputError
 from guided_lgp.logic import Domain
 from guided_lgp.params import Params, TrainRelational
 from guided_lgp.policy.arrays import BoolArray
-from guided_lgp.policy.relational.encoding import Range, Situations, graphs
+from guided_lgp.policy.relational.encoding import GOAL_HELD, Range, Situations, graphs
 from guided_lgp.policy.relational.heads import heads
 from guided_lgp.policy.relational.model import Model
 from guided_lgp.policy.relational.samples import Examples
 from guided_lgp.policy.relational.training import fit
-from guided_lgp.policy.tensors import read_tensors
+from guided_lgp.policy.tensors import Shape, read_arrays, require_range
+
+_DEMONSTRATIONS: dict[str, tuple[type, Shape]] = {
+    "positions": (np.float32, ("states", "nodes", 3)),
+    "shapes": (np.float32, ("states", "nodes", 4)),
+    "supports": (np.int8, ("states", "bodies")),
+    "goals": (np.int8, ("states", "bodies")),
+    "right": (np.bool_, ("states", "grippers", "nodes")),
+    "wrong": (np.bool_, ("states", "grippers", "nodes")),
+    "configuration": (np.int32, ("states",)),
+}
+"""What :mod:`~guided_lgp.cases.demonstrate` writes."""
 
 logger = logging.getLogger(__name__)
 
@@ -57,12 +69,23 @@ def load_demonstrations(root: Path, case: str, domain: Domain) -> Examples:
         InputError: the file is missing or damaged; the message names the stage.
     """
     remedy = f"the output of demonstrate --case {case}"
-    arrays = read_tensors(demonstrations_of(root, case), remedy)
+    path = demonstrations_of(root, case)
+    arrays, sizes = read_arrays(path, _DEMONSTRATIONS, remedy)
+    limits = {
+        "supports": (-sizes["grippers"], sizes["nodes"]),
+        "goals": (GOAL_HELD, sizes["nodes"]),
+        "configuration": (0, np.inf),
+    }
+    require_range(path, arrays, limits, remedy)
+    if sizes["bodies"] >= sizes["nodes"] or len(np.unique(arrays["configuration"])) < 2:
+        raise InputError(str(path), "has no surface, or only one scene", remedy)
+    if not arrays["right"].any(axis=(1, 2)).all():
+        raise InputError(f"{path}: right", "has a state without a right action", remedy)
     situations = Situations(
         positions=arrays["positions"],
         supports=arrays["supports"].astype(np.int64),
         goals=arrays["goals"].astype(np.int64),
-        grippers=arrays["right"].shape[1],
+        grippers=sizes["grippers"],
         shapes=arrays["shapes"],
     )
     configuration = arrays["configuration"]

@@ -4,14 +4,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter, model_validator
 
 from guided_lgp.documents import read_json
 from guided_lgp.errors import InputError
 from guided_lgp.experiments.problems import PROBLEMS
-from guided_lgp.faults import first_fault
+from guided_lgp.faults import validated
 from guided_lgp.paths import METRICS
-from guided_lgp.search.planners import TABLE_1, TABLE_3
+from guided_lgp.search.planners import CASE_PLANNERS, TABLE_1, TABLE_3
 
 Metrics = Mapping[str, Any]
 
@@ -145,10 +145,16 @@ class CaseFigures(_Figures):
     physics_share: Share | None
 
 
+def _known(rival: str) -> str:
+    if rival not in CASE_PLANNERS:
+        raise ValueError(f"unknown planner {rival!r}")
+    return rival
+
+
 class CaseRatio(_Figures):
     """The policy's calls as a share of the best rival's, with an interval."""
 
-    rival: str
+    rival: Annotated[str, AfterValidator(_known)]
     calls: Number
     rival_calls: Annotated[float, Field(gt=0)]
     ratio: Number
@@ -183,13 +189,9 @@ def read_metrics(path: Path, stage: str, shape: TypeAdapter[Any]) -> Metrics:
         InputError: the file is missing or damaged, or does not hold that.
     """
     remedy = f"the output of stage {stage}"
-    document = read_json(path, remedy)
-    try:
-        shape.validate_python(document)
-    except ValidationError as error:
-        raise first_fault(error, str(path), remedy) from None
-    found: Metrics = document
-    return found
+    document: Metrics = read_json(path, remedy)
+    validated(shape.validate_python, document, str(path), remedy)
+    return document
 
 
 def read_evaluations(root: Path) -> tuple[Metrics, Metrics, Metrics]:

@@ -7,10 +7,10 @@ mirrors another one has the same names but for that.
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
 from guided_lgp.documents import read_yaml
-from guided_lgp.faults import Document, first_fault
+from guided_lgp.faults import Document, validated
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Length = Annotated[float, Field(gt=0, le=10, allow_inf_nan=False)]
@@ -177,10 +177,7 @@ def read_document(file: Path) -> RobotDocument:
         InputError: the first fault, with file and field.
     """
     data = read_yaml(file, "a robot file")
-    try:
-        return RobotDocument.model_validate(data)
-    except ValidationError as error:
-        raise first_fault(error, str(file)) from None
+    return validated(RobotDocument.model_validate, data, str(file))
 
 
 def _whole(name: str, arm: Any, arms: dict[str, Any]) -> Any:

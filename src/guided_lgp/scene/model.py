@@ -5,6 +5,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -14,7 +15,6 @@ from pydantic import (
     ConfigDict,
     Field,
     SerializerFunctionWrapHandler,
-    ValidationError,
     field_validator,
     model_serializer,
     model_validator,
@@ -22,7 +22,7 @@ from pydantic import (
 
 from guided_lgp.documents import read_json
 from guided_lgp.domains import PAPER, domain_names, load_domain
-from guided_lgp.faults import Document, brief, first_fault, refuse_unknown
+from guided_lgp.faults import Document, brief, refuse_unknown, validated
 from guided_lgp.logic import State, Symbols
 from guided_lgp.poses import Array, compose, pose, quaternion
 from guided_lgp.robots import Robot, load_robot, tilted_robot
@@ -293,10 +293,7 @@ def parse_scene(document: object, where: str, folder: Path = Path()) -> Scene:
     Raises:
         InputError: the first fault found, with file and field.
     """
-    try:
-        return Scene.model_validate(document, context={"folder": folder})
-    except ValidationError as error:
-        raise first_fault(error, where) from None
+    return validated(partial(Scene.model_validate, context={"folder": folder}), document, where)
 
 
 def load_scene(path: str | Path) -> Scene:

@@ -7,10 +7,10 @@ from hashlib import md5, sha256
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel
 
 from guided_lgp.errors import InputError
-from guided_lgp.faults import first_fault
+from guided_lgp.faults import validated
 from guided_lgp.params import Params
 from guided_lgp.paths import PARAMS
 from guided_lgp.tracking.metrics import flatten
@@ -76,14 +76,13 @@ def read_lock(path: Path) -> list[StageFiles]:
     if not path.is_file():
         raise InputError(str(path), "not found: no stage has run here", remedy)
     try:
-        document = _Lock.model_validate(load_yaml(path))
-    except ValidationError as error:
-        raise first_fault(error, str(path)) from None
+        document = load_yaml(path)
     except (ParseError, OSError, ValueError) as error:
         raise InputError(
             str(path), f"is not YAML: {' '.join(str(error).split())}", remedy
         ) from None
-    return [StageFiles.of(name, entry.model_dump()) for name, entry in document.stages.items()]
+    stages = validated(_Lock.model_validate, document, str(path)).stages
+    return [StageFiles.of(name, entry.model_dump()) for name, entry in stages.items()]
 
 
 def running_stage(address: str) -> StageFiles:

@@ -2,36 +2,24 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidationError
 
 from guided_lgp.documents import read_json, write_json
 from guided_lgp.errors import InputError
-from guided_lgp.faults import first_fault
+from guided_lgp.faults import validated
 from guided_lgp.logic import Objective, Symbols, parse_objective
 from guided_lgp.policy.arrays import FloatArray, IntArray
 from guided_lgp.policy.paper.documents import DatasetDocument, in_files
 from guided_lgp.policy.paper.encoding import VERSION, Encoding
 from guided_lgp.policy.paper.signature import INSTRUCTION
-from guided_lgp.policy.tensors import read_tensors, write_tensors
+from guided_lgp.policy.tensors import Limits, Shape, read_arrays, require_range, write_tensors
 
 _SAMPLES = "samples.safetensors"
 _DOCUMENT = "dataset.json"
 _STAGE = "build_dataset"
 _REMEDY = f"the output of the stage {_STAGE}"
-
-_ARRAYS = {
-    "states": np.float32,
-    "actions": np.int8,
-    "supports": np.int8,
-    "configuration": np.int32,
-    "goals": np.float32,
-    "sample_state": np.int32,
-    "sample_goals": np.int32,
-}
 
 
 @dataclass(frozen=True)
@@ -107,7 +95,7 @@ class Dataset:
 
     def save(self, directory: Path) -> None:
         """Write ``samples.safetensors`` and ``dataset.json``; same samples, same bytes."""
-        arrays = {name: getattr(self, name) for name in _ARRAYS}
+        arrays = {name: getattr(self, name) for name in _declared(self.encoding)}
         digest = write_tensors(directory / _SAMPLES, arrays)
         document = {
             "version": VERSION,
@@ -128,10 +116,8 @@ def load_dataset(directory: Path) -> Dataset:
         InputError: a file is missing, damaged, or of another version.
     """
     path = directory / _DOCUMENT
-    try:
-        document = DatasetDocument.model_validate(read_json(path, _REMEDY))
-    except ValidationError as error:
-        raise first_fault(error, str(path), _REMEDY) from None
+    validate = DatasetDocument.model_validate
+    document = validated(validate, read_json(path, _REMEDY), str(path), _REMEDY)
     encoding = Encoding.parse(document.encoding, str(path), _STAGE)
     own = document.__pydantic_extra__
     names = {kind: own.get(in_files(kind), []) for kind, _ in encoding.slots}
@@ -144,10 +130,19 @@ def load_dataset(directory: Path) -> Dataset:
         raise InputError(str(path), "has other numbers of symbols than its encoding", _REMEDY)
     configurations = tuple(document.configurations)
     path = directory / _SAMPLES
-    samples = read_tensors(path, _REMEDY, document.digest)
-    wrong = _fault(samples, encoding, len(configurations))
-    if wrong is not None:
-        raise InputError(str(path), wrong, _REMEDY)
+    samples, sizes = read_arrays(path, _declared(encoding), _REMEDY, document.digest)
+    decisions = encoding.signature.decisions
+    limits: dict[str, Limits] = {
+        "actions": ([0, *[-1] * (len(decisions) - 1)], [encoding.classes(d) for d in decisions]),
+        "supports": (-encoding.holders, encoding.supports),
+        "configuration": (0, len(configurations)),
+        "sample_state": (0, sizes["states"]),
+        "sample_goals": (0, sizes["goals"]),
+    }
+    require_range(path, samples, limits, _REMEDY)
+    if not _named_alike(samples["actions"], encoding):
+        fault = "name other symbols than their instructions do"
+        raise InputError(f"{path}: actions", fault, _REMEDY)
     return Dataset(encoding, symbols, objectives, configurations, **samples)
 
 
@@ -157,42 +152,22 @@ def _names_of(symbols: Symbols, encoding: Encoding) -> dict[str, tuple[str, ...]
     return {in_files(kind): signature.own(kind, symbols) for kind in signature.kinds}
 
 
-def _fault(samples: dict[str, Any], encoding: Encoding, configurations: int) -> str | None:
-    """What is wrong with arrays that were read, if anything is."""
-    if set(samples) != set(_ARRAYS):
-        return f"has the arrays {', '.join(sorted(samples))}"
-    for name, array in samples.items():
-        if not array.ndim:
-            return f"{name}: is a single number"
-    states, goals = len(samples["states"]), len(samples["goals"])
-    widths = {
-        "states": (encoding.state_size,),
-        "goals": (encoding.goals * encoding.goal_size,),
-        "actions": (len(encoding.signature.decisions),),
-        "supports": (encoding.bodies,),
+def _declared(encoding: Encoding) -> dict[str, tuple[type, Shape]]:
+    """Type and shape of all arrays: of the states, of the encoded objectives, of the samples."""
+    return {
+        "states": (np.float32, ("states", encoding.state_size)),
+        "actions": (np.int8, ("states", len(encoding.signature.decisions))),
+        "supports": (np.int8, ("states", encoding.bodies)),
+        "configuration": (np.int32, ("states",)),
+        "goals": (np.float32, ("goals", encoding.goals * encoding.goal_size)),
+        "sample_state": (np.int32, ("samples",)),
+        "sample_goals": (np.int32, ("samples",)),
     }
-    for name, array in samples.items():
-        rows = {"goals": goals, "sample_state": -1, "sample_goals": -1}.get(name, states)
-        shape = (len(array) if rows < 0 else rows, *widths.get(name, ()))
-        if array.dtype != _ARRAYS[name] or array.shape != shape:
-            return f"{name}: are {array.dtype} of shape {array.shape}"
-        if not np.isfinite(array).all():
-            return f"{name}: are not all finite"
+
+
+def _named_alike(actions: NDArray[np.int8], encoding: Encoding) -> bool:
+    """Whether each action names the symbols that its instruction does, and no others."""
     decisions = encoding.signature.decisions
-    limits = {
-        "actions": ([0, *[-1] * (len(decisions) - 1)], [encoding.classes(d) for d in decisions]),
-        "supports": (-encoding.holders, encoding.supports),
-        "configuration": (0, configurations),
-        "sample_state": (0, states),
-        "sample_goals": (0, goals),
-    }
-    for name, (least, end) in limits.items():
-        if ((samples[name] < least) | (samples[name] >= end)).any():
-            return f"{name}: are out of range"
     chains = [encoding.chains[name] for name in encoding.signature.instructions]
     named = np.array([[d == INSTRUCTION or d in chain for d in decisions] for chain in chains])
-    if ((samples["actions"] >= 0) != named[samples["actions"][:, 0]]).any():
-        return "actions: name other symbols than their instructions do"
-    if len(samples["sample_state"]) != len(samples["sample_goals"]):
-        return "sample_goals: not as many as sample_state"
-    return None
+    return bool(((actions >= 0) == named[actions[:, 0]]).all())

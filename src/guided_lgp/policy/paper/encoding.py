@@ -12,11 +12,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidationError
 
 from guided_lgp.domains import PAPER
 from guided_lgp.errors import InputError
-from guided_lgp.faults import first_fault
+from guided_lgp.faults import validated
 from guided_lgp.logic import Action, Objective, State, Symbols, satisfied, unsatisfied
 from guided_lgp.policy.arrays import FloatArray
 from guided_lgp.policy.paper.documents import EncodingDocument, in_files
@@ -341,8 +340,9 @@ class Encoding:
             InputError: another version, or a document that does not describe this encoding.
         """
         remedy = f"the encoding of version {VERSION}; run the stage {stage} again"
+        validate = EncodingDocument.model_validate
+        read = validated(validate, document, where, remedy, within="encoding")
         try:
-            read = EncodingDocument.model_validate(document)
             encoding = cls(
                 domain=read.domain,
                 slots=_known_slots(read),
@@ -352,8 +352,6 @@ class Encoding:
                 scale=tuple(read.normalisation.scale),
             )
             faithful = encoding._scaled_whole() and document == encoding.document()
-        except ValidationError as error:
-            raise first_fault(error, where, remedy, within="encoding") from None
         except (KeyError, InputError):
             faithful = False
         if not faithful:

@@ -5,11 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
 from guided_lgp.documents import read_json, write_json
 from guided_lgp.errors import InputError
-from guided_lgp.faults import first_fault
+from guided_lgp.faults import validated
 from guided_lgp.policy.arrays import FloatArray
 from guided_lgp.policy.paper.documents import NetworkDocument
 from guided_lgp.policy.paper.encoding import VERSION, Encoding
@@ -64,10 +62,8 @@ def load_model(directory: Path, network: str, stage: str = "train_policy") -> Mo
     """
     path = directory / f"{network}.json"
     remedy = f"version {VERSION}, the output of the stage {stage}"
-    try:
-        document = NetworkDocument.model_validate(read_json(path, remedy))
-    except ValidationError as error:
-        raise first_fault(error, str(path), remedy) from None
+    validate = NetworkDocument.model_validate
+    document = validated(validate, read_json(path, remedy), str(path), remedy)
     encoding = Encoding.parse(document.encoding, str(path), stage)
     if document.network != network or not _fit(document.sub_policies, network, encoding):
         raise InputError(f"{path}: sub_policies", "do not fit the network's chain", remedy)

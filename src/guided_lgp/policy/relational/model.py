@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from guided_lgp.documents import read_json, write_json
 from guided_lgp.domains import PAPER, load_domain
 from guided_lgp.errors import InputError
-from guided_lgp.faults import first_fault
+from guided_lgp.faults import validated
 from guided_lgp.logic import Domain
 from guided_lgp.policy.arrays import BoolArray, FloatArray
 from guided_lgp.policy.relational.encoding import EDGE_FEATURES, NODE_FEATURES, Graphs, Range
@@ -209,10 +209,7 @@ def load_weights(directory: Path) -> Weights:
         InputError: a file is missing, damaged, of another version or for another encoding.
     """
     path = directory / f"{NAME}.json"
-    try:
-        document = _Document.model_validate(read_json(path, _REMEDY))
-    except ValidationError as error:
-        raise first_fault(error, str(path), _REMEDY) from None
+    document = validated(_Document.model_validate, read_json(path, _REMEDY), str(path), _REMEDY)
     sight = _sight(document, path)
     limits = Range(tuple(document.limits.lower), tuple(document.limits.upper))
     domain = load_domain(document.domain)
