@@ -134,7 +134,9 @@ class Recorder:
 
     def __init__(self, solver: Any) -> None:
         self._solver = solver
-        self.reach = solver.reach
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._solver, name)
 
     def solve(self, program: Any, values: Any, settings: Any) -> Any:
         """As the solver does."""

@@ -7,7 +7,7 @@ import pytest
 
 from guided_lgp.bounds.coarse import CoarseBound
 from guided_lgp.bounds.coarse.facts import Facts
-from guided_lgp.bounds.coarse.reach import Limb
+from guided_lgp.bounds.coarse.unreachable import Limb
 from guided_lgp.bounds.program.geometry import SceneGeometry
 from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.bounds.results import Array

@@ -7,7 +7,7 @@ from guided_lgp.bounds.checks import Top
 from guided_lgp.bounds.coarse.solver import default_solver
 from guided_lgp.bounds.program.geometry import GraspSide
 from guided_lgp.bounds.program.grasp import PALM_GAP, tool_targets
-from guided_lgp.bounds.program.inverse import reaches
+from guided_lgp.bounds.program.inverse import start_ik
 from guided_lgp.bounds.program.kernels import SCALE
 from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.bounds.program.slots import HeldBox
@@ -59,12 +59,12 @@ def test_hold(gripper: str) -> None:
     rng, verdicts = np.random.default_rng(0), []
     arm = kinematics_of(ROBOT).arms[gripper]
     widest = arm.arm.fingers.grasp_width
-    reach = reaches(kinematics_of(ROBOT), FIXED, default_solver(ROBOT).reach)[gripper]
+    ik = start_ik(kinematics_of(ROBOT), FIXED, default_solver(ROBOT).closed_form)[gripper]
     for _ in range(80):
         place = np.array([0.55, 0.2 * arm.side, rng.uniform(-1.5, 1.5), rng.uniform(0.5, 0.8)])
         pitch, offset = rng.uniform(0.4, 2.7), rng.uniform(-0.04, 0.04)
         depth = rng.uniform(PALM_GAP, 0.04)
-        joints, missing = reach(
+        joints, missing = ik(
             held(gripper), (offset, depth), place[None], np.array([pitch]), np.zeros((1, 2))
         )
         q = joints[0, 0, 0, np.argmin(missing[0, 0, 0])].copy()

@@ -16,7 +16,7 @@ logging.getLogger("toppra").setLevel(logging.ERROR)
 
 def _duration(path: np.ndarray, arm: Arm) -> float:
     """The time (s) at 97 % of the limits, on a grid of 4 cm of the arm's motion."""
-    lengths = np.sum(np.abs(np.diff(path, axis=0)) * arm.reaches, axis=1)
+    lengths = np.sum(np.abs(np.diff(path, axis=0)) * arm.metric, axis=1)
     s = np.concatenate([[0.0], np.cumsum(lengths)])
     limits = [
         toppra.constraint.JointVelocityConstraint(_both_ways(0.97 * arm.velocity_limits)),

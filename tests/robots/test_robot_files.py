@@ -73,7 +73,7 @@ def test_measures_are_there(robot: Robot) -> None:
         assert 0 < arm.fingers.grasp_width < arm.fingers.widest
         assert arm.palm_front < 0
         assert np.all(arm.lever_arms[:-1] > 0)
-        assert np.all(arm.reaches >= arm.lever_arms - 0.01)
+        assert np.all(arm.metric >= arm.lever_arms - 0.01)
         assert arm.fingers.value(arm.fingers.widest) == pytest.approx(arm.fingers.opened)
 
 

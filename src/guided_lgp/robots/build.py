@@ -131,7 +131,7 @@ def _arm(
         segment_ends=segments.ends,
         segment_radius=segments.radius,
         lever_arms=np.array(_stated(arm.lever_arms, lambda: measures.lever_arms)),
-        reaches=np.array(_stated(arm.reaches, lambda: measures.reaches)),
+        metric=np.array(_stated(arm.metric, lambda: measures.metric)),
         spheres=spheres,
         spheres_between_arms=_stated(arm.spheres_between_arms, lambda: _largest(spheres)),
         fingers=_fingers(arm.fingers, measures, description, finger),

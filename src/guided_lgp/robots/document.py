@@ -112,7 +112,7 @@ class ArmDocument(Document):
     fingers: FingersDocument = FingersDocument()
     lever_arms: tuple[Number, ...] | None = None
     """How far each joint moves the tool frame per rad, at most. Derived."""
-    reaches: tuple[Number, ...] | None = None
+    metric: tuple[Number, ...] | None = None
     """How far each joint moves a point of hand or held box per rad; the metric of paths. Derived:
     the lever arms and 15 cm."""
     spheres: dict[str, tuple[tuple[Number, Number, Number, Length], ...]] | None = None
@@ -128,7 +128,7 @@ class ArmDocument(Document):
 
     @model_validator(mode="after")
     def _one_value_per_joint(self) -> "ArmDocument":
-        for field in ("home", "lever_arms", "reaches", "signs"):
+        for field in ("home", "lever_arms", "metric", "signs"):
             values = getattr(self, field)
             if values and len(values) != len(self.joints):
                 raise ValueError(f"{field} has {len(values)} values for {len(self.joints)} joints")

@@ -131,6 +131,6 @@ def _solver(robot: Robot, gripper: str, fixed: Mapping[str, float]) -> tuple[Sol
         limits = np.sort(arm.signs[:, None] * arm.limits, axis=1)
         lift = sum(fixed[name] for name in lengths.raised_by)
         solver = OffsetShoulder(lengths, limits, arm.signs, lift)
-        return solver, solver.shoulder, float(arm.reaches[1])
+        return solver, solver.shoulder, float(arm.metric[1])
     general = inverse_kinematics(robot, gripper, fixed)
     return general, general.chain.points[1], float(arm.lever_arms[1])

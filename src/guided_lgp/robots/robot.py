@@ -160,7 +160,7 @@ class Arm:
     lever_arms: Array
     """(n,) m. Longest distance from each joint's axis to the tool frame, over all configurations:
     a joint that turns by an angle moves the tool by at most its lever times the angle."""
-    reaches: Array
+    metric: Array
     """(n,) m per rad: how far a point of hand or held object moves; the metric of paths."""
     spheres: tuple[Sphere, ...]
     """Cover arm and open hand."""

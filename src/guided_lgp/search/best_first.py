@@ -60,8 +60,8 @@ def plan_by_discrepancy(problem: Problem) -> SearchResult:
     What is proved to be out of an arm's reach is not tried.
     """
     tree = SkeletonTree(problem)
-    reach = FactsOfPairs(problem, tree.run)
-    return search(tree, PolicyEstimate(problem, detour=0.0), reach)
+    facts = FactsOfPairs(problem, tree.run)
+    return search(tree, PolicyEstimate(problem, detour=0.0), facts)
 
 
 def plan_informed(problem: Problem) -> SearchResult:

@@ -87,8 +87,8 @@ def _source(robot: Robot) -> str:
     )
     macros = {
         "KERNELS": entries,
-        "REACHES": ", ".join(form.name() for form in forms.values()) or "0",
-        "REACH_INPUTS": INPUTS,
+        "FORMS": ", ".join(form.name() for form in forms.values()) or "0",
+        "FORM_INPUTS": INPUTS,
         "LARGEST_INPUT": max(kernel.inputs for kernel in table),
         "LARGEST_ROWS": max(kernel.rows for kernel in table),
         "WORK": max(1, *(function.sz_w() for function in (*functions, *forms.values()))),

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from guided_lgp.bounds.coarse.formulation import straight_lines
-from guided_lgp.bounds.coarse.reach import Grasp, Limb
+from guided_lgp.bounds.coarse.unreachable import Grasp, Limb
 from guided_lgp.bounds.program.context import Line
 from guided_lgp.bounds.program.geometry import GraspSide, SceneGeometry
 from guided_lgp.bounds.program.grasp import INSET, PALM_GAP, grasp_sides

@@ -1,6 +1,6 @@
 /* Augmented Lagrangian with Levenberg-Marquardt Gauss-Newton steps for a nonlinear program that is
  * a list of kernel instances. The translation unit starts with the generated kernels and defines
- * KERNELS (the table), REACHES (closed forms), REACH_INPUTS, LARGEST_INPUT, LARGEST_ROWS and WORK;
+ * KERNELS (the table), FORMS (closed forms), FORM_INPUTS, LARGEST_INPUT, LARGEST_ROWS and WORK;
  * cholesky.c follows.
  * `Interpreter` in solver.py is the same algorithm on CasADi's virtual machine; keep the two alike.
  */
@@ -16,7 +16,7 @@ typedef struct {
 } kernel_type;
 
 static const kernel_type kernel_table[] = {KERNELS};
-static const function reach_table[] = {REACHES}; /* closed forms */
+static const function form_table[] = {FORMS}; /* closed forms */
 
 typedef struct {
     int variables, instances, rows;
@@ -306,13 +306,13 @@ int coarse_solve(const program *nlp, const settings *options, double *values, do
     return tried;
 }
 
-/* Closed-form inverse kinematics of `count` arguments (REACH_INPUTS each) to as many results. */
-void coarse_reach(int form, int outputs, int count, const double *x, double *out)
+/* Closed-form inverse kinematics of `count` arguments (FORM_INPUTS each) to as many results. */
+void coarse_closed_form(int form, int outputs, int count, const double *x, double *out)
 {
     double work[WORK];
     for (int i = 0; i < count; i++) {
-        const double *arguments[] = {x + REACH_INPUTS * i};
+        const double *arguments[] = {x + FORM_INPUTS * i};
         double *results[] = {out + outputs * i};
-        reach_table[form](arguments, results, NULL, work, 0);
+        form_table[form](arguments, results, NULL, work, 0);
     }
 }

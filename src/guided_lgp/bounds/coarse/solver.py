@@ -63,7 +63,7 @@ class Solver(Protocol):
         """Solve from a start: values of the variables, then the constants."""
         ...
 
-    def reach(self, chain: str, arguments: Array) -> Array:
+    def closed_form(self, chain: str, arguments: Array) -> Array:
         """Closed-form inverse kinematics of a chain.
 
         Arguments (count, 20) to joints and a cost (count, n + 1), see
@@ -96,9 +96,9 @@ class Compiled:
         self._solve = library.coarse_solve
         self._solve.restype = ctypes.c_int
         self._solve.argtypes = [ctypes.c_void_p] * 5
-        self._reach = library.coarse_reach
-        self._reach.restype = None
-        self._reach.argtypes = [ctypes.c_int] * 3 + [ctypes.c_void_p] * 2
+        self._closed_form = library.coarse_closed_form
+        self._closed_form.restype = None
+        self._closed_form.argtypes = [ctypes.c_int] * 3 + [ctypes.c_void_p] * 2
         arms = closed_form_arms(kinematics_of(robot))
         self._forms = {name: (i, 1 + len(arm.home)) for i, (name, arm) in enumerate(arms.items())}
 
@@ -121,12 +121,14 @@ class Compiled:
         )
         return Solution(values, residuals, worst.value, steps)
 
-    def reach(self, chain: str, arguments: Array) -> Array:
+    def closed_form(self, chain: str, arguments: Array) -> Array:
         """See :class:`Solver`."""
         number, outputs = self._forms[chain]
         arguments = np.ascontiguousarray(arguments)
         solutions = np.empty((len(arguments), outputs))
-        self._reach(number, outputs, len(arguments), arguments.ctypes.data, solutions.ctypes.data)
+        self._closed_form(
+            number, outputs, len(arguments), arguments.ctypes.data, solutions.ctypes.data
+        )
         return solutions
 
 
@@ -188,7 +190,7 @@ class Interpreter:
             penalty = min(penalty * settings.growth, settings.largest_penalty)
         return Solution(values, c, worst, tried)
 
-    def reach(self, chain: str, arguments: Array) -> Array:
+    def closed_form(self, chain: str, arguments: Array) -> Array:
         """See :class:`Solver`."""
         form = closed_forms(self._robot)[chain]
         return np.array(form.map(len(arguments))(np.asarray(arguments).T)).T

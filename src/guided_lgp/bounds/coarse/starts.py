@@ -11,7 +11,7 @@ from guided_lgp.bounds.coarse.formulation import Formulation
 from guided_lgp.bounds.coarse.solver import Solver
 from guided_lgp.bounds.program.draft import Draft
 from guided_lgp.bounds.program.geometry import SceneGeometry
-from guided_lgp.bounds.program.inverse import reaches
+from guided_lgp.bounds.program.inverse import start_ik
 from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.bounds.results import Array
 from guided_lgp.bounds.terms import hold
@@ -23,7 +23,7 @@ class Starts:
     def __init__(self, geometry: SceneGeometry, solver: Solver) -> None:
         placed = geometry.scene.robot
         self._robot = kinematics_of(placed.description)
-        self._reach = reaches(self._robot, tuple(placed.fixed_values.values()), solver.reach)
+        self._ik = start_ik(self._robot, tuple(placed.fixed_values.values()), solver.closed_form)
 
     def draw(
         self,
@@ -57,7 +57,7 @@ class Starts:
             noise,
             formulation.configurations,
             self._robot,
-            self._reach,
+            self._ik,
         )
         for choice in formulation.choices:
             choice.start(draft)

@@ -10,7 +10,7 @@ from guided_lgp.bounds.path.grips import Grips
 from guided_lgp.bounds.path.placing import STRATEGIES, Place, PlacementSampler, PlaceStrategy
 from guided_lgp.bounds.path.situation import Fingers, Situation, matrix_pose
 from guided_lgp.bounds.path.steps import Way
-from guided_lgp.bounds.path.task import Reach, Stage, Task
+from guided_lgp.bounds.path.task import IkSolutions, Stage, Task
 from guided_lgp.bounds.results import Array
 from guided_lgp.poses import compose, inverse, rotation_matrix
 
@@ -56,15 +56,15 @@ class Foresight:
         if not targets:
             return None
         holder = self._task.manoeuvres[index].parent
-        reach = self._reach(later, holder, targets, grips)
-        cost = reach.cost.reshape(len(targets), len(grips), -1).min(axis=(0, 2))
+        solutions = self._solutions(later, holder, targets, grips)
+        cost = solutions.cost.reshape(len(targets), len(grips), -1).min(axis=(0, 2))
         if not np.isfinite(cost).any():
             self._task.record(later, Stage.REACH, "no inverse kinematics")
         return Outlook(
             cost,
             cache(
                 lambda grip: self._possible(
-                    later, holder, expected, targets, reach, grips, width, grip
+                    later, holder, expected, targets, solutions, grips, width, grip
                 )
             ),
         )
@@ -76,13 +76,15 @@ class Foresight:
             return self._placements.places(later, expected, coarse, strategy)
         return [Place(coarse[action.body], Way(0.0))] if strategy == STRATEGIES[0] else []
 
-    def _reach(self, later: int, holder: str, targets: list[Place], grips: Grips) -> Reach:
+    def _solutions(
+        self, later: int, holder: str, targets: list[Place], grips: Grips
+    ) -> IkSolutions:
         """Configurations for every target, and there for every grip."""
         tools = [grips.tools(t.pose[:3], rotation_matrix(t.pose[3:])) for t in targets]
         rotation = np.concatenate([tool[0] for tool in tools])
         contact = np.concatenate([tool[1] for tool in tools])
         ways = [t.way.of(tool[0]) for t, tool in zip(targets, tools, strict=True)]
-        return self._task.reach(
+        return self._task.solutions(
             later, self._task.arms[holder], rotation, contact, np.concatenate(ways)
         )
 
@@ -117,7 +119,7 @@ class Foresight:
         holder: str,
         expected: Situation,
         targets: list[Place],
-        reach: Reach,
+        solutions: IkSolutions,
         grips: Grips,
         width: float,
         grip: int,
@@ -127,15 +129,15 @@ class Foresight:
         count = len(grips)
         holding = replace(expected, carried=self._carried(later, holder, grips, grip))
         around = holding.around(holder, [(action.body, action.parent)])
-        cost = np.full_like(reach.cost, np.inf)
-        cost[grip::count] = reach.cost[grip::count]
-        for choice in replace(reach, cost=cost).order()[:_FORESEEN]:
+        cost = np.full_like(solutions.cost, np.inf)
+        cost[grip::count] = solutions.cost[grip::count]
+        for choice in replace(solutions, cost=cost).order()[:_FORESEEN]:
             number, value, branch = choice
-            ends = reach.q[number, :, value, branch]
+            ends = solutions.q[number, :, value, branch]
             if task.blocked(later, Stage.CONTACT, "at the contact", around, ends):
                 continue
             left = self._left(later, expected, targets[number // count].pose, width)
-            if self._can_leave(later, holder, left, reach, choice):
+            if self._can_leave(later, holder, left, solutions, choice):
                 return True
         return False
 
@@ -170,17 +172,22 @@ class Foresight:
         )
 
     def _can_leave(
-        self, later: int, holder: str, left: Situation, reach: Reach, choice: tuple[int, int, int]
+        self,
+        later: int,
+        holder: str,
+        left: Situation,
+        solutions: IkSolutions,
+        choice: tuple[int, int, int],
     ) -> bool:
         """Whether the hand, where it is the one that leaves, has a free end of its way out."""
         task, (number, value, branch) = self._task, choice
         way_out = task.manoeuvres[later].way_out
         if way_out.gripper != holder:
             return True
-        rotation, contact = reach.rotation[number], reach.contact[number]
+        rotation, contact = solutions.rotation[number], solutions.contact[number]
         ends = np.array([contact + way.of(rotation) for way in way_out.ways])[:, None]
         q, valid = task.arms[holder].inverse(
-            rotation, ends, reach.redundancies[value] + np.array(task.shifts(holder))
+            rotation, ends, solutions.redundancies[value] + np.array(task.shifts(holder))
         )
         if not valid[..., branch].any():
             task.record(later, Stage.OFF, "out of reach on the way out")

@@ -136,7 +136,7 @@ def optimal_path(
         np.linspace(0.0, s[-1], WAYPOINTS + 2),
         None if before is None else _direction(arm, before[-2], before[-1]),
         None if after is None else _direction(arm, after[0], after[1]),
-        arm.reaches,
+        arm.metric,
     )
     points = np.stack([np.interp(spline.knots, s, joint) for joint in path.T], axis=1)
     vertical = placed.forward(path[0])[0][2] if transit.keep_level else None
@@ -191,14 +191,14 @@ class _Spline:
     """Derivative (n,) at the start; None where the motion begins at rest."""
     into: Array | None
     """The same for the end."""
-    reaches: Array
+    metric: Array
     """(n,) m per rad."""
 
     def sampled(self, points: Array) -> Array:
         """Through (WAYPOINTS + 2, n), at steps that are short enough for collision checks."""
         curve = Cubic(self.knots, points, self.out, self.into)
         fine = np.linspace(0.0, self.knots[-1], _FINE)
-        ways = np.sum(np.abs(np.diff(curve(fine), axis=0)) * self.reaches, axis=1)
+        ways = np.sum(np.abs(np.diff(curve(fine), axis=0)) * self.metric, axis=1)
         way = np.concatenate([[0.0], np.cumsum(ways)])
         marks = np.linspace(0.0, way[-1], 2 + int(way[-1] / STEP))
         path = curve(np.interp(marks, way, fine))

@@ -15,7 +15,7 @@ from guided_lgp.bounds.path.contacts import Contacts, ContactSampler
 from guided_lgp.bounds.path.motions import Motion, Surroundings, Tool
 from guided_lgp.bounds.path.situation import Attach, Fingers, Release, Situation, Step
 from guided_lgp.bounds.path.spaces import wound
-from guided_lgp.bounds.path.task import Choice, Culprits, Outcome, Reach, Stage, Task
+from guided_lgp.bounds.path.task import Choice, Culprits, IkSolutions, Outcome, Stage, Task
 from guided_lgp.bounds.results import Array
 from guided_lgp.poses import compose, inverse, pose, rotation_matrix, yaw_of
 
@@ -115,12 +115,12 @@ class OutcomeSampler:
         )
         arm = task.arms[holder]
         rotation, nowhere = rotation_matrix(tool[3:])[None], np.zeros((1, 3))
-        reach = task.reach(index, arm, rotation, tool[None, :3], nowhere)
+        solutions = task.solutions(index, arm, rotation, tool[None, :3], nowhere)
         if loaded:
-            reach = task.level_reach(reach, holder, situation)
+            solutions = task.level_solutions(solutions, holder, situation)
         now, around = situation.q[arm.arm.slice], situation.around(holder)
-        for _, value, branch in reach.order()[: 2 * _POSTURES]:
-            goal = arm.near(reach.q[0, 0, value, branch], now)
+        for _, value, branch in solutions.order()[: 2 * _POSTURES]:
+            goal = arm.near(solutions.q[0, 0, value, branch], now)
             if task.blocked(index, Stage.REACH, "presenting", around, goal[None]):
                 continue
             steps = task.transit(around, now, goal, loaded)
@@ -145,29 +145,29 @@ class OutcomeSampler:
         task = self._task
         gripper = task.manoeuvres[index].gripper
         for contacts in self._contacts.contacts(index, situation, width):
-            reach = task.reach(
+            solutions = task.solutions(
                 index, task.arms[gripper], contacts.rotation, contacts.position, contacts.way
             )
             if situation.loaded(gripper):
-                reach = task.level_reach(reach, gripper, situation)
-            if np.isfinite(reach.cost).any():
-                yield from self._at(index, situation, contacts, reach)
+                solutions = task.level_solutions(solutions, gripper, situation)
+            if np.isfinite(solutions.cost).any():
+                yield from self._at(index, situation, contacts, solutions)
             else:
                 task.record(index, Stage.REACH, "no inverse kinematics")
 
     def _at(
-        self, index: int, situation: Situation, contacts: Contacts, reach: Reach
+        self, index: int, situation: Situation, contacts: Contacts, solutions: IkSolutions
     ) -> Iterator[Outcome]:
         """Carry out an action with the nearest configurations that are free of collisions."""
         task, action = self._task, self._task.manoeuvres[index]
         at = situation.around(action.gripper, [(action.body, action.parent)])
         off = situation.around(action.gripper)
-        attempts = np.zeros(len(reach.cost), dtype=int)
-        for choice in reach.order(contacts.cost)[:_CONFIGURATIONS]:
+        attempts = np.zeros(len(solutions.cost), dtype=int)
+        for choice in solutions.order(contacts.cost)[:_CONFIGURATIONS]:
             number, value, branch = choice
             if attempts[number] >= _POSTURES:
                 continue
-            contact, before = reach.q[number, :, None, value, branch]
+            contact, before = solutions.q[number, :, None, value, branch]
             if task.blocked(index, Stage.CONTACT, "at the contact", at, contact):
                 continue
             if task.blocked(index, Stage.OFF, "before the contact", off, before):
@@ -175,21 +175,21 @@ class OutcomeSampler:
             if not contacts.possible(number):
                 continue
             attempts[number] += 1
-            outcome = self._planned(index, situation, reach, choice)
+            outcome = self._planned(index, situation, solutions, choice)
             if outcome is not None:
                 attempts[number] = _POSTURES
                 yield outcome
 
     def _planned(
-        self, index: int, situation: Situation, reach: Reach, choice: Choice
+        self, index: int, situation: Situation, solutions: IkSolutions, choice: Choice
     ) -> Outcome | None:
         """Plan all motions of an action from one configuration, straight lines first."""
         task, action = self._task, self._task.manoeuvres[index]
         gripper, arm = action.gripper, task.arms[action.gripper]
         leaving = task.arms[action.way_out.gripper]
-        start, tool = situation.q[arm.arm.slice], reach.tool(choice)
+        start, tool = situation.q[arm.arm.slice], solutions.tool(choice)
         around = situation.around(gripper, [(action.body, action.parent)])
-        line = self._line(index, Stage.LINE_IN, around, tool, reach.way[choice[0]])
+        line = self._line(index, Stage.LINE_IN, around, tool, solutions.way[choice[0]])
         if line is None:
             return None
         # Full turns of a joint move the hand in the last bit only, but what is let go of keeps it.

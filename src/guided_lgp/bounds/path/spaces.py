@@ -33,7 +33,7 @@ class JointSpace:
         self._q = q
         self._fingers = fingers
         self._joints = arm.arm.slice
-        self.scale = arm.arm.reaches
+        self.scale = arm.arm.metric
         limits = arm.arm.limits.copy()
         limits[arm.turning] = -np.pi, np.pi
         self.low, self.high = limits.T

@@ -76,7 +76,7 @@ class FurthestFailure:
 
 
 @dataclass(frozen=True)
-class Reach:
+class IkSolutions:
     """Configurations of an arm for N tool poses at a contact and off it."""
 
     rotation: Array
@@ -150,7 +150,7 @@ class Task:
         self.start = situation_at_start(scene, goals.upright)
         self.culprits = Culprits()
         """Of the action begun last."""
-        self._reaches: dict[_Key, Reach] = {}
+        self._kept: dict[_Key, IkSolutions] = {}
 
     def __len__(self) -> int:
         return len(self.manoeuvres)
@@ -185,9 +185,9 @@ class Task:
         """The gripper that holds a body, or what the body stands on, before an action."""
         return self.states[index].holder(self.root(index, body))
 
-    def reach(
+    def solutions(
         self, index: int, arm: PlacedArm, rotation: Array, contact: Array, way: Array
-    ) -> Reach:
+    ) -> IkSolutions:
         """Solve the inverse kinematics of N tool poses at the contact and off it.
 
         An action is begun in many situations, most of which leave its contacts where they were.
@@ -196,29 +196,33 @@ class Task:
         values = np.append(arm.redundancies, coarse)
         arrays = (values, rotation, contact, way)
         key: _Key = (arm.gripper, *(array.tobytes() for array in arrays))
-        if key not in self._reaches:
-            self._reaches[key] = self._reach(arm, rotation, contact, way, values)
-        return self._reaches[key]
+        if key not in self._kept:
+            self._kept[key] = self._solved(arm, rotation, contact, way, values)
+        return self._kept[key]
 
     @staticmethod
-    def _reach(arm: PlacedArm, rotation: Array, contact: Array, way: Array, values: Array) -> Reach:
+    def _solved(
+        arm: PlacedArm, rotation: Array, contact: Array, way: Array, values: Array
+    ) -> IkSolutions:
         positions = np.stack([contact, contact + way], axis=1)[:, :, None]
         q, valid = arm.inverse(
             rotation[:, None, None],
             positions,
             np.broadcast_to(values, (len(contact), 2, len(values))),
         )
-        distance = np.linalg.norm((q[:, 1] - arm.arm.home) * arm.arm.reaches, axis=-1)
+        distance = np.linalg.norm((q[:, 1] - arm.arm.home) * arm.arm.metric, axis=-1)
         cost = np.where(valid.all(axis=1), distance, np.inf)
-        return Reach(rotation, contact, way, q, values, cost)
+        return IkSolutions(rotation, contact, way, q, values, cost)
 
-    def level_reach(self, reach: Reach, gripper: str, situation: Situation) -> Reach:
+    def level_solutions(
+        self, solutions: IkSolutions, gripper: str, situation: Situation
+    ) -> IkSolutions:
         """What a level motion can reach: the branch stays; the nearest first."""
         arm, now = self.arms[gripper], situation.q[self.arms[gripper].arm.slice]
-        way = (arm.near(reach.q[:, 1], now) - now) * arm.arm.reaches
-        same = np.isfinite(reach.cost)
+        way = (arm.near(solutions.q[:, 1], now) - now) * arm.arm.metric
+        same = np.isfinite(solutions.cost)
         same[..., np.arange(same.shape[-1]) != arm.branch(now)] = False
-        return replace(reach, cost=np.where(same, np.linalg.norm(way, axis=-1), np.inf))
+        return replace(solutions, cost=np.where(same, np.linalg.norm(way, axis=-1), np.inf))
 
     def shifts(self, gripper: str) -> tuple[float, ...]:
         """Turns of an arm's redundant joint on a straight way off that are worth a try."""

@@ -44,7 +44,7 @@ def time_path(path: Array, arm: Arm) -> tuple[Array, Array]:
     Returns:
         times (T,) from 0 (s), and configurations (T, n).
     """
-    lengths = np.sum(np.abs(np.diff(path, axis=0)) * arm.reaches, axis=1)
+    lengths = np.sum(np.abs(np.diff(path, axis=0)) * arm.metric, axis=1)
     path = path[np.concatenate([[True], lengths > 1e-9])]
     s = np.concatenate([[0.0], np.cumsum(lengths[lengths > 1e-9])])
     if len(path) == 1:

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from guided_lgp.bounds.program.inverse import Reach
+from guided_lgp.bounds.program.inverse import StartIk
 from guided_lgp.bounds.program.kinematics import RobotKinematics
 from guided_lgp.bounds.program.slots import ArmConfiguration, HeldBox, PlanarPose
 from guided_lgp.bounds.results import Array
@@ -23,7 +23,7 @@ class Draft:
         noise: float,
         configurations: Mapping[HeldBox, Sequence[ArmConfiguration]],
         robot: RobotKinematics,
-        reach: Mapping[str, Reach],
+        ik: Mapping[str, StartIk],
     ) -> None:
         """Begin a start.
 
@@ -36,7 +36,7 @@ class Draft:
             noise: how far from the best candidates a choice may be (0: the best ones).
             configurations: of each grip.
             robot: whose arms these are.
-            reach: inverse kinematics of its arms, by gripper.
+            ik: inverse kinematics of its arms, by gripper.
         """
         self.values = values
         self.lower = lower
@@ -45,7 +45,7 @@ class Draft:
         self.noise = noise
         self.configurations = configurations
         self.robot = robot
-        self.reach = reach
+        self.ik = ik
         self._variables = variables
 
     def pose(self, pose: PlanarPose) -> Array:

@@ -86,9 +86,9 @@ def tool_target(pose: Any, height: Any, grip: Any, p: Any, palm_front: float) ->
     x_axis = ca.vertcat(ch * cp, sh * cp, -sp)
     y_axis = ca.vertcat(-sh, ch, 0)
     z_axis = ca.vertcat(ch * sp, sh * sp, cp)
-    reach = half_length * absolute(cp) + half_height * sp + palm_front + depth
+    extent = half_length * absolute(cp) + half_height * sp + palm_front + depth
     centre = ca.vertcat(pose[0], pose[1], height)
-    return centre - (reach + back) * x_axis - offset * z_axis, ca.horzcat(x_axis, y_axis, z_axis)
+    return centre - (extent + back) * x_axis - offset * z_axis, ca.horzcat(x_axis, y_axis, z_axis)
 
 
 def tool_targets(
@@ -114,8 +114,8 @@ def tool_targets(
     y_axis = np.stack([zero - sh, zero + ch, zero], axis=-1)
     z_axis = np.stack([ch * sp, sh * sp, zero + cp], axis=-1)
     offset, depth = hand
-    reach = held.side.half_length * np.abs(cp) + held.half_height * sp + palm_front + depth
-    contact = poses[:, None, [0, 1, 3]] - reach[:, None] * x_axis - offset * z_axis
+    extent = held.side.half_length * np.abs(cp) + held.half_height * sp + palm_front + depth
+    contact = poses[:, None, [0, 1, 3]] - extent[:, None] * x_axis - offset * z_axis
     position = contact[:, :, None] - ends[:, :1] * x_axis[:, :, None]
     position[..., 2] += ends[:, 1]
     return np.stack([x_axis, y_axis, z_axis], axis=-1)[:, :, None], position
@@ -124,10 +124,10 @@ def tool_targets(
 def in_tool(held: HeldBox, values: Array, palm_front: float) -> Array:
     """Pose (7,) of a held box in the tool frame of its gripper."""
     pitch, offset, depth = values[list(held.grip)]
-    reach = held.side.half_length * abs(np.cos(pitch)) + held.half_height * np.sin(pitch)
+    extent = held.side.half_length * abs(np.cos(pitch)) + held.half_height * np.sin(pitch)
     level = np.array([0.0, -np.sin(pitch / 2), 0.0, np.cos(pitch / 2)])
     turned = multiply(level, pose((0, 0, 0), -held.side.turn)[3:])
-    return np.array([reach + palm_front + depth, 0.0, offset, *turned])
+    return np.array([extent + palm_front + depth, 0.0, offset, *turned])
 
 
 def read_grip(
@@ -149,6 +149,6 @@ def read_grip(
         pitch = float((2 * np.arctan2(-y, w) + np.pi / 2) % (2 * np.pi) - np.pi / 2)
         across = max(abs(x), abs(z)) < turned_off and abs(grasp[1]) < off
         if across and -turned_off <= pitch <= np.pi + turned_off:
-            reach = side.half_length * abs(np.cos(pitch)) + half_height * np.sin(pitch)
-            return turned, (pitch, float(grasp[2]), float(grasp[0] - reach - palm_front))
+            extent = side.half_length * abs(np.cos(pitch)) + half_height * np.sin(pitch)
+            return turned, (pitch, float(grasp[2]), float(grasp[0] - extent - palm_front))
     return None

@@ -39,7 +39,7 @@ Evaluate = Callable[[str, Array], Array]
 """Runs the closed form of a chain: its name and arguments (count, 20) to (count, n + 1)."""
 
 
-class Reach(Protocol):
+class StartIk(Protocol):
     """Inverse kinematics of one arm for starts, in the convention of its chain."""
 
     def __call__(
@@ -76,7 +76,7 @@ class ClosedForm:
     def __call__(
         self, held: HeldBox, hand: Hand, poses: Array, pitches: Array, ends: Array
     ) -> tuple[Array, Array]:
-        """See :class:`Reach`."""
+        """See :class:`StartIk`."""
         shape = (len(poses), len(pitches), len(ends), 2 * len(_PANS))
         arguments = np.empty((*shape, INPUTS))
         arguments[...] = self._candidates
@@ -108,7 +108,7 @@ class General:
     def __call__(
         self, held: HeldBox, hand: Hand, poses: Array, pitches: Array, ends: Array
     ) -> tuple[Array, Array]:
-        """See :class:`Reach`; every branch at the contact goes on on the nearest at the ends."""
+        """See :class:`StartIk`; every branch at the contact goes on on the nearest at the ends."""
         rotation, position = tool_targets(held, hand, poses, pitches, ends, self._arm.palm_front)
         q, missing = self._solver.nearest(
             self._mounting.T @ rotation[..., None, :, :],
@@ -144,9 +144,9 @@ _LOST = 100.0
 """Weight (rad/m) of what is missing against the way from the contact, in choosing branches."""
 
 
-def reaches(
+def start_ik(
     kinematics: RobotKinematics, fixed: tuple[float, ...], evaluate: Evaluate
-) -> dict[str, Reach]:
+) -> dict[str, StartIk]:
     """The inverse kinematics of every arm, by gripper.
 
     Args:
@@ -206,4 +206,4 @@ def _closed_form(arm: ArmKinematics) -> Any:
     within = ca.fmin(ca.fmax(joints, low), high)
     values, limited = (ca.vertsplit(part) for part in (joints, within))
     cost = _cost(values, limited, solution[-1], ca.vertsplit(x[16:]))
-    return ca.Function(f"reach_{arm.chain.name}", [x], [ca.vertcat(within, cost)])
+    return ca.Function(f"closed_form_{arm.chain.name}", [x], [ca.vertcat(within, cost)])

@@ -253,7 +253,7 @@ def _solutions(
     """
     ends = np.array([(0.0, 0.0), *((segment.back, segment.up) for segment in segments)])
     offset, depth = draft.values[[held.offset, held.depth]].tolist()
-    joints, costs = draft.reach[held.gripper](held, (offset, depth), poses, tried, ends)
+    joints, costs = draft.ik[held.gripper](held, (offset, depth), poses, tried, ends)
     return joints, costs.sum(axis=2)
 
 

@@ -72,7 +72,7 @@ class ArmMeasures:
         return tuple(lever_arms(self.chain).tolist())
 
     @property
-    def reaches(self) -> tuple[float, ...]:
+    def metric(self) -> tuple[float, ...]:
         """How far (m) each joint moves a point of hand or held object per rad."""
         return tuple(lever + _LOAD for lever in self.lever_arms)
 

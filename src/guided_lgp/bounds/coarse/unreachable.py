@@ -129,9 +129,9 @@ class Limb:
         cp, sp = np.cos(pitch), np.sin(pitch)
         shift = np.hypot(half[4], half[5]) + _SLACK
         tip = np.hypot(along, up) + shift
-        reach = grasp.half_length * np.abs(cp) + grasp.half_height * sp
-        slope = np.hypot(grasp.half_length, grasp.half_height)  # of the reach in the pitch
-        held = up * sp - along * cp + shift + half[3] * (tip + slope) >= reach + grasp.palm
+        extent = grasp.half_length * np.abs(cp) + grasp.half_height * sp
+        slope = np.hypot(grasp.half_length, grasp.half_height)  # of the extent in the pitch
+        held = up * sp - along * cp + shift + half[3] * (tip + slope) >= extent + grasp.palm
         for back, raised in grasp.ends:
             behind = self.hand + back
             flat = along - behind * cp
@@ -269,8 +269,9 @@ def _typical(grasp: Grasp, cells: Array) -> Array:
     touching = grasp.half_length * np.abs(cp) + grasp.half_height * sp + grasp.palm
     within = grasp.high[4:6] / np.maximum(np.abs([cp, sp]).T, 1e-9)
     moved = []
-    for reach in (touching, within.min(axis=1)):
-        tip = np.clip(np.stack([-reach * cp, reach * sp], axis=1), grasp.low[4:6], grasp.high[4:6])
+    for extent in (touching, within.min(axis=1)):
+        tip = np.stack([-extent * cp, extent * sp], axis=1)
+        tip = np.clip(tip, grasp.low[4:6], grasp.high[4:6])
         moved.append(np.column_stack([cells[:, :4], tip, cells[:, 6]]))
     return np.concatenate(moved)
 
