@@ -26,8 +26,8 @@ _STRONGEST = 1000.0
 _CENTRED = 2e-4
 """How far (m) beyond their middle fingers that press want to be: one motor moves them all, so that
 whatever they hold stays in the middle."""
-_TIP_TORQUE = 0.05
-"""Nm: fingertips that hang on fingers turn until they lie flat on what they hold."""
+_TIP_TORQUE = 5.0
+"""Nm by which fingertips that hang on fingers stay parallel; softer ones tilt and let go."""
 
 
 class Simulation:
