@@ -137,6 +137,16 @@ static int is_active(const program *nlp, int i, const double *c, const double *m
     return 0;
 }
 
+/* Whether any input of an instance is a variable that can move. */
+static int is_free(const program *nlp, int i)
+{
+    const int *inputs = nlp->inputs + nlp->input_start[i];
+    for (int j = 0; j < kernel_table[nlp->kernel[i]].inputs; j++)
+        if (inputs[j] < nlp->variables && nlp->lower[inputs[j]] < nlp->upper[inputs[j]])
+            return 1;
+    return 0;
+}
+
 /* The shape of H where some instances are active. */
 static void find_shape(const program *nlp, const char *active, skyline *shape)
 {
@@ -168,7 +178,7 @@ static void linearise(const program *nlp, const double *values, const double *c,
     double x[LARGEST_INPUT], work[WORK], again[LARGEST_ROWS];
     double jacobian[LARGEST_ROWS * LARGEST_INPUT];
     for (int i = 0; i < nlp->instances; i++)
-        active[i] = (char)is_active(nlp, i, c, multiplier, penalty);
+        active[i] = is_free(nlp, i) && is_active(nlp, i, c, multiplier, penalty);
     find_shape(nlp, active, shape);
     memset(H, 0, sizeof(double) * (shape->end[n - 1] + 1));
     for (int v = 0; v < n; v++) {
@@ -247,7 +257,8 @@ int coarse_solve(const program *nlp, const settings *options, double *values, do
             linearise(nlp, values, c, multiplier, penalty, active, &shape, g, H);
             for (int v = 0; v < n; v++) {
                 int k = nlp->order[v];
-                held[k] = (values[v] <= nlp->lower[v] && g[k] > 0) ||
+                held[k] = nlp->lower[v] == nlp->upper[v] ||
+                          (values[v] <= nlp->lower[v] && g[k] > 0) ||
                           (values[v] >= nlp->upper[v] && g[k] < 0);
             }
             int accepted = 0;

@@ -161,6 +161,7 @@ class Interpreter:
                 g, H = self._linearise(program, values, c, multiplier, penalty, equality)
                 x = values[:n].copy()
                 held = ((x <= program.lower) & (g > 0)) | ((x >= program.upper) & (g < 0))
+                held |= program.lower == program.upper
                 free = ~held
                 accepted, gain = False, 0.0
                 while not accepted and tried < settings.steps:
