@@ -3,10 +3,25 @@
 from hashlib import sha256
 from pathlib import Path
 
+from pydantic import BaseModel
+
 from guided_lgp.documents import read_yaml
+from guided_lgp.errors import InputError
+from guided_lgp.faults import validated
 from guided_lgp.paths import SOURCES
 
 _PACKAGE = Path("src")
+
+
+class _Stage(BaseModel):
+    """What of a stage is read here."""
+
+    deps: list[str] = []
+    do: "_Stage | None" = None
+
+
+class _Stages(BaseModel):
+    stages: dict[str, _Stage]
 
 
 def source_digest(stages: Path, name: str) -> str:
@@ -17,11 +32,14 @@ def source_digest(stages: Path, name: str) -> str:
         name: the stage; for one of several, without what tells it from the others.
 
     Raises:
-        InputError: the file is missing or damaged.
+        InputError: the file is missing or damaged, or has no such stage.
     """
-    declared = read_yaml(SOURCES / stages)["stages"][name]
+    file = SOURCES / stages
+    known = validated(_Stages.model_validate, read_yaml(file), str(file)).stages
+    if name not in known:
+        raise InputError(str(file), f"has no stage {name!r}")
     digest = sha256()
-    for dependency in declared.get("do", declared)["deps"]:
+    for dependency in (known[name].do or known[name]).deps:
         if Path(dependency).is_relative_to(_PACKAGE):
             for file in _files(SOURCES / dependency):
                 digest.update(file.read_bytes())

@@ -2,9 +2,13 @@
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
 from guided_lgp.documents import read_json
+from guided_lgp.errors import InputError
+from guided_lgp.faults import validated
 from guided_lgp.report.table import Table
 from guided_lgp.search.planners import PAPERS
 from guided_lgp.studies.cases import CLASSIFIER, PLANNERS, RESULTS
@@ -20,19 +24,97 @@ Runs = Mapping[str, Mapping[str, Mapping[str, Figures]]]
 """Policy, search, without or with the classifier, figure."""
 
 
+_ORIGIN = "the output of studies/run.py feasibility"
+Item = TypeVar("Item")
+Count = Annotated[int, Field(ge=0, le=10**12)]
+Share = Annotated[float, Field(ge=0, le=1)]
+Seconds = Annotated[float, Field(ge=0, le=1e12)]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(strict=True)
+
+
+class _Calls(_Part):
+    """What one search did with one policy."""
+
+    shortest: Share
+    no_solution: Share
+    coarse_calls: Count
+    infeasible_calls: Count
+
+
+class _Times(_Part):
+    """How long it took."""
+
+    coarse_s: Annotated[Seconds, Field(gt=0)]
+    infeasible_s: Seconds
+    policy_s: Seconds
+
+
+class _Bin(_Part):
+    """Predicted and observed shares, from one probability on."""
+
+    start: Annotated[Share, Field(alias="from")]
+    n: Count
+    predicted: Share
+    feasible: Share
+
+
+_Pair = Annotated[list[Item], Field(min_length=2, max_length=2)]
+
+
+class _Classifier(_Part):
+    """How far it can be trusted."""
+
+    n: Count
+    brier: Share
+    brier_base: Share
+    ece: Share
+    confusion: _Pair[_Pair[Count]]
+    bins: list[_Bin]
+
+
+class _Figures(_Part):
+    classifier: _Classifier
+    search: dict[str, dict[str, dict[str, _Calls]]]
+
+
+_FIGURES = TypeAdapter[Any](_Figures)
+_TIMES = TypeAdapter[Any](dict[str, dict[str, dict[str, _Times]]])
+
+
 def feasibility_tables(root: Path) -> dict[str, Table]:
     """By file name: what the classifier saves, and how far its probabilities can be trusted.
 
     Raises:
-        InputError: an output of the stage feasibility is missing.
+        InputError: an output of the stage feasibility is missing or damaged.
     """
-    origin = "the output of studies/run.py feasibility"
-    figures = read_json(root / RESULTS / "feasibility.json", origin)
-    times = read_json(root / RESULTS / "feasibility_timing.json", origin)
+    figures = _read(root / RESULTS / "feasibility.json", _FIGURES)
+    times = _read(root / RESULTS / "feasibility_timing.json", _TIMES)
+    runs = [_names(figures["search"]), _names(times)]
+    if not runs[0] or runs[0] != runs[1]:
+        raise InputError(str(root / RESULTS), "lacks figures or times of a search", _ORIGIN)
     return {
         "feasibility": _savings(figures["search"], times),
         "feasibility_reliability": _reliability(figures["classifier"]),
     }
+
+
+def _read(path: Path, shape: TypeAdapter[Any]) -> Any:
+    document = read_json(path, _ORIGIN)
+    validated(shape.validate_python, document, str(path), _ORIGIN)
+    return document
+
+
+def _names(runs: Runs) -> set[str]:
+    """The policies, if all their searches are there, without and with the classifier."""
+    wanted = {(search, classified) for search in SEARCHES for classified in CLASSIFIER}
+    found = {
+        policy: {(search, kind) for search, kinds in searches.items() for kind in kinds}
+        for policy, searches in runs.items()
+    }
+    return set(found) if all(known == wanted for known in found.values()) else set()
 
 
 def verdict(times: Runs) -> str:

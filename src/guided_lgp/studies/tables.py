@@ -5,9 +5,13 @@ import shutil
 import statistics
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
 from guided_lgp.documents import read_json, write_text
+from guided_lgp.errors import InputError
+from guided_lgp.faults import validated
 from guided_lgp.report.table import Record, Table
 from guided_lgp.studies import cases
 from guided_lgp.studies.cases import OUTCOMES, RESULTS, StudyParams, StudyTable, load_study
@@ -20,6 +24,23 @@ SHOWN = (("shortest", "all"), ("shortest", "unseen"), ("no_solution", "all"))
 Figures = Mapping[str, Mapping[str, Mapping[str, Mapping[str, Sequence[float]]]]]
 """Case, planner, subset, figure: one value per run."""
 
+Share = Annotated[float, Field(ge=0, le=1)]
+
+
+class _Runs(BaseModel):
+    """Of one planner and set of objectives: one value per run."""
+
+    model_config = ConfigDict(strict=True)
+
+    n: Annotated[list[Annotated[int, Field(ge=0, le=10**9)]], Field(min_length=1)]
+    shortest: Annotated[list[Share], Field(min_length=1)]
+    feasible: Annotated[list[Share], Field(min_length=1)]
+    no_solution: Annotated[list[Share], Field(min_length=1)]
+
+
+_Subsets = Annotated[dict[Literal["all", "unseen"], _Runs], Field(min_length=2)]
+_FIGURES = TypeAdapter(dict[str, dict[str, _Subsets]])
+
 logger = logging.getLogger(__name__)
 
 
@@ -27,17 +48,14 @@ def render(root: Path) -> None:
     """Write the tables.
 
     Raises:
-        InputError: bad parameters, or an output of the stage evaluate is missing.
+        InputError: bad parameters, or an output of the stage evaluate is missing or damaged.
     """
     study, _ = load_study(root)
     folder = root / RESULTS / "tables"
     shutil.rmtree(folder, ignore_errors=True)
     tables = {}
     for name, content in study.tables.items():
-        figures = read_json(
-            root / RESULTS / f"{name}.json", "the output of studies/run.py evaluate"
-        )
-        tables[name] = _table(name, content, figures, study)
+        tables[name] = _table(name, content, read_figures(root, name, content), study)
     tables |= feasibility_tables(root)
     for name, table in tables.items():
         for suffix, text in (("tex", table.latex()), ("csv", table.csv())):
@@ -45,6 +63,21 @@ def render(root: Path) -> None:
     sections = [table.markdown() for table in tables.values()]
     write_text(root / RESULTS / "studies.md", "\n".join(["# Studies", "", *sections]))
     logger.info("studies: %s", root / RESULTS / "studies.md")
+
+
+def read_figures(root: Path, name: str, content: StudyTable) -> Figures:
+    """The figures of all cases of a study.
+
+    Raises:
+        InputError: the file is missing or damaged, or lacks a case or planner.
+    """
+    path, remedy = root / RESULTS / f"{name}.json", "the output of studies/run.py evaluate"
+    figures: Figures = read_json(path, remedy)
+    validated(_FIGURES.validate_python, figures, str(path), remedy)
+    for case in content.cases:
+        if not PLANNERS.keys() <= figures.get(case, {}).keys():
+            raise InputError(f"{path}: {case}", "lacks a planner", remedy)
+    return figures
 
 
 def _table(name: str, content: StudyTable, figures: Figures, study: StudyParams) -> Table:
