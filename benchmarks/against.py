@@ -20,6 +20,9 @@ from typing import Any
 
 import numpy as np
 
+from guided_lgp.logic.objectives import satisfied, two_goal_objectives
+from guided_lgp.scene import generate
+
 ROOT = Path(__file__).parents[1]
 BASELINE = "50577ca"
 """The version that all later ones are measured against."""
@@ -216,6 +219,27 @@ def enumeration(pair: Pair, count: int) -> dict[str, Any]:
     }
 
 
+def plans(pair: Pair, count: int) -> dict[str, Any]:
+    """Whole plans of the default planner: two goals in every configuration of setup a."""
+    problems = list(_problems(max(1, count // 50)))
+    pair.ask("plan", *problems[0])  # which loads what all others find loaded
+    answers = [pair.ask("plan", *problem) for problem in problems]
+    both = [answer for answer in answers if _both(answer, True)]
+    old, new = (sum(answer[version]["seconds"] for answer in both) for version in VERSIONS)
+    solved = {f"{v}_solved": sum(answer[v]["feasible"] for answer in answers) for v in VERSIONS}
+    return summary(both) | solved | {"problems": len(answers), "ratio_of_sums": old / new}
+
+
+def _problems(count: int) -> Iterator[tuple[str, int, list[str]]]:
+    """Setup, configuration, and two goals that do not hold there yet; so many of each."""
+    rng = np.random.default_rng([SEED, 3])
+    for number, scene in enumerate(generate("a", SCENES, SEED, "bench").scenes):
+        pairs = two_goal_objectives(scene.symbols)
+        open_ones = [pair for pair in pairs if not satisfied(scene.state, pair)]
+        for choice in rng.integers(len(open_ones), size=count):
+            yield "a", number, [str(goal) for goal in open_ones[choice]]
+
+
 def coarse_step(pair: Pair, count: int) -> dict[str, Any]:
     """One step of the solver on a program of 40 actions with ten boxes."""
     rng = np.random.default_rng([SEED, 2])
@@ -271,6 +295,7 @@ PARTS: dict[str, Callable[[Pair, int], Any]] = {
     "path_bound": path_bound,
     "enumeration": enumeration,
     "coarse_step": coarse_step,
+    "plans": plans,
 }
 
 

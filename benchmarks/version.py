@@ -129,6 +129,14 @@ def enumeration(setup: str, number: int) -> dict[str, Any]:
     return {"verdicts": rows, "seconds": seconds}
 
 
+def whole_plan(setup: str, number: int, goals: list[str]) -> dict[str, Any]:
+    """The default planner, from reading the goals to the verified motion."""
+    place, planning = Here(setup, number), import_module("guided_lgp.planning")
+    began = time.process_time()
+    result = planning.plan(place.scene, goals)
+    return {"feasible": result.path is not None, "seconds": time.process_time() - began}
+
+
 class Recorder:
     """A solver that remembers the last program."""
 
@@ -168,6 +176,7 @@ REQUESTS: dict[str, Callable[..., Any]] = {
     "path": path_verdict,
     "enumeration": enumeration,
     "step": step,
+    "plan": whole_plan,
 }
 
 if __name__ == "__main__":
