@@ -275,7 +275,7 @@ def _observed(problem: Problem) -> ObservedBounds:
 def _finding(problem: Problem, obstacles: Sequence[Obstacle]) -> Finding | None:
     """Why a search has found nothing, by facts of the scene; None if they tell nothing in time."""
     assert isinstance(problem.parts, SceneBounds)
-    facts = TaskFacts(problem.parts, problem.objective, problem.misplaced)
+    facts = TaskFacts(problem.parts, problem.objective, problem.misplaced, problem.deadline)
     judged = [obstacle.example for obstacle in obstacles if obstacle.bound == "coarse"]
     with suppress(OutOfTimeError):
         return facts.after_search() or (facts.about(judged[0]) if judged else None)

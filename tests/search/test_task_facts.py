@@ -9,6 +9,7 @@ from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.logic import parse_objective, parse_skeleton
 from guided_lgp.params import load_planning
 from guided_lgp.scene import Box, Scene, load_scene
+from guided_lgp.scene.bodies import Obstacle
 from guided_lgp.search.facts import KINDS, Finding, TaskFacts
 
 ROOT = Path(__file__).parents[2]
@@ -130,6 +131,23 @@ def test_a_box_between_others_that_no_hand_can_take() -> None:
         facts(ROW.model_copy(update={"boxes": tuple(boxes)}), "(held p2)").after_search()
     )
     assert (finding.kind, finding.help) == ("blocked", "space between p1, p2, p3")
+
+
+def test_obstacles_that_keep_all_arms_away_are_named() -> None:
+    sides = (("near", -0.055), ("far", 0.055))
+    walls = [
+        Obstacle(name=name, size=(0.16, 0.03, 0.12), position=(0.54, 0.33 + y, 0.66))
+        for name, y in sides
+    ]
+    lid = Obstacle(name="lid", size=(0.22, 0.15, 0.02), position=(0.54, 0.33, 0.735))
+    beside = Obstacle(name="beside", size=(0.03, 0.03, 0.12), position=(0.54, 0.52, 0.66))
+    p2 = next(box for box in ROW.boxes if box.name == "p2")
+    body = p2.model_copy(update={"position": (0.54, 0.33, 0.65)})
+    hidden = ROW.model_copy(update={"boxes": (body,), "obstacles": (*walls, lid, beside)})
+    finding = found(facts(hidden, "(held p2)").after_search())
+    assert finding.kind == "blocked"
+    assert finding.text.startswith("near, far around p2: both arms fail to grasp it")
+    assert finding.help == "space between p2 and near, far"
 
 
 def test_the_part_of_a_sequence_that_cannot_be_done() -> None:

@@ -13,6 +13,7 @@ import numpy as np
 
 from guided_lgp.bounds.coarse.pairs import Pairs
 from guided_lgp.bounds.coarse.parts import Boxes, stacked_with
+from guided_lgp.bounds.deadline import NEVER, Deadline
 from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.domains import extensions, load_domain
 from guided_lgp.logic import (
@@ -31,6 +32,7 @@ from guided_lgp.scene.bodies import Body, Box, Table
 from guided_lgp.scene.footprints import footprint, gap, inner_radius, inset, seat
 from guided_lgp.scene.tolerances import MARGIN
 from guided_lgp.search.conflicts import Conflicts
+from guided_lgp.search.surroundings import barriers
 
 Kind = Literal["width", "reach", "room", "way", "blocked", "part", "posture"]
 
@@ -68,7 +70,11 @@ class TaskFacts:
     """The facts of one objective in one scene, each found when it is first asked for."""
 
     def __init__(
-        self, bounds: SceneBounds, objective: Objective, misplaced: Iterable[str] = ()
+        self,
+        bounds: SceneBounds,
+        objective: Objective,
+        misplaced: Iterable[str] = (),
+        deadline: Deadline = NEVER,
     ) -> None:
         """Begin with none.
 
@@ -76,9 +82,11 @@ class TaskFacts:
             bounds: of the scene.
             objective: the goals.
             misplaced: bodies that the goals want elsewhere on what they stand on.
+            deadline: that of the bounds.
         """
         self.scene = bounds.scene
         self._misplaced = sorted(misplaced)
+        self._deadline = deadline
         self._bounds = bounds
         self._objective = objective
         self._symbols, self._state = self.scene.symbols, self.scene.state
@@ -240,12 +248,21 @@ class TaskFacts:
         moves = list(self._moves())
         for body, _ in moves:
             if not self.graspable_by(body) and self._takings(body):
-                text = f"{self._every_arm} fail to grasp {body} there, even alone in the scene"
-                yield Finding("reach", text, f"move {body} or the robot, or a smaller {body}")
+                yield self._kept_from(body)
             yield from self._deadlock(body)
         for body, parents in moves:
             if parents <= set(self._symbols.surfaces):
                 yield from self._no_way(body, parents)
+
+    def _kept_from(self, body: str) -> Finding:
+        """Why no arm takes a body that is alone with what stands still."""
+        fixed = barriers(body, self._takings(body), self.scene, self._deadline)
+        if not fixed:
+            text = f"{self._every_arm} fail to grasp {body} there, even alone in the scene"
+            return Finding("reach", text, f"move {body} or the robot, or a smaller {body}")
+        several = ", ".join(fixed)
+        text = f"{several} around {body}: {self._every_arm} fail to grasp it, even as the only box"
+        return Finding("blocked", text, f"space between {body} and {several}")
 
     def graspable_by(self, body: str) -> tuple[str, ...]:
         """The grippers that can take a body where it is at the start, alone with its stack."""
