@@ -239,5 +239,10 @@ def test_the_release_is_the_same_everywhere(wheel: Path) -> None:
 def test_continuous_integration_runs_what_anyone_can_run() -> None:
     workflow = yaml.safe_load((ROOT / ".github/workflows/ci.yml").read_text())
     assert workflow["jobs"]["test"]["steps"][-1]["run"] == ".ci/run"
+    installed = [step.get("run") for step in workflow["jobs"]["install"]["steps"]]
+    command = "pip install '.[view]'"
+    assert command in installed
+    for page in (ROOT / "README.md", ROOT / "docs/index.md"):
+        assert f"```sh\n{command}\n```" in page.read_text(encoding="utf-8")
     for form in (ROOT / ".github/ISSUE_TEMPLATE").glob("*.yml"):
         assert {"name", "description", "body"} <= yaml.safe_load(form.read_text()).keys()

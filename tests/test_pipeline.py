@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -143,23 +144,28 @@ def test_a_changed_and_a_missing_output_are_differences(tmp_path: Path) -> None:
 
 
 class Clone:
-    """A temporary clone of the working tree with the small profile."""
+    """A clone in a temporary folder, and commands in it."""
 
-    def __init__(self, folder: Path, workers: int = 2) -> None:
+    def __init__(self, folder: Path) -> None:
         self.folder = folder
         path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
         self._environment = {
             name: value for name, value in os.environ.items() if not name.startswith("DVC_")
         } | {"PATH": path, "OMP_NUM_THREADS": "1", "MLFLOW_TRACKING_URI": self.uri}
-        listing = self._run("git", "ls-files", "-co", "--exclude-standard", where=ROOT).stdout
+
+    @classmethod
+    def of_the_working_tree(cls, folder: Path) -> "Clone":
+        clone = cls(folder)
+        listing = clone._run("git", "ls-files", "-co", "--exclude-standard", where=ROOT).stdout
         for name in listing.splitlines():
             if name.startswith("src/guided_lgp") or (ROOT / name).is_file():
                 (folder / name).parent.mkdir(parents=True, exist_ok=True)
                 shutil.copy(ROOT / name, folder / name)
-        params = (ROOT / "tests" / "params.yaml").read_text()
-        (folder / "params.yaml").write_text(params.replace("workers: 2", f"workers: {workers}"))
-        (folder / "dvc.lock").unlink(missing_ok=True)
-        self.git("init", "-q")
+        clone.git("init", "-q")
+        clone.commit()
+        return clone
+
+    def commit(self) -> None:
         self.git("add", "-A")
         self.git("-c", "user.name=test", "-c", "user.email=test@localhost", "commit", "-qm", "test")
 
@@ -171,7 +177,11 @@ class Clone:
         self._run("git", *arguments)
 
     def dvc(self, *arguments: str) -> str:
-        done = self._run("dvc", *arguments)
+        return self.command("dvc", *arguments)
+
+    def command(self, *words: str) -> str:
+        """What a command prints; it must succeed."""
+        done = self._run(*words)
         assert done.returncode == 0, done.stdout + done.stderr
         return done.stdout + done.stderr
 
@@ -196,11 +206,20 @@ class Clone:
 
 @pytest.fixture(scope="module")
 def clone(tmp_path_factory: pytest.TempPathFactory) -> Clone:
-    """The small profile after one run of the whole pipeline."""
-    clone = Clone(tmp_path_factory.mktemp("clone"))
-    output = clone.dvc("repro")
+    """The small profile after one run of the whole pipeline, as the README has it run."""
+    sources = Clone.of_the_working_tree(tmp_path_factory.mktemp("clone"))
+    (sources.folder / ".venv").symlink_to(sys.prefix)
+    output = sources.command("make", "--old-file=.venv/.installed", "quick")
     assert "MLflow: not recorded" not in output
+    clone = Clone(sources.folder / "quick")
+    clone.commit()
     return clone
+
+
+def commands(page: Path) -> list[str]:
+    """The lines of the blocks of shell commands in a page."""
+    blocks = re.findall(r"^```sh\n(.*?)^```", page.read_text(), flags=re.DOTALL | re.MULTILINE)
+    return "".join(blocks).splitlines()
 
 
 @pytest.mark.pipeline
@@ -234,7 +253,10 @@ class TestSmallProfile:
         assert "Table III" in page
 
     def test_one_worker_writes_the_same_bytes(self, clone: Clone, tmp_path: Path) -> None:
-        alone = Clone(tmp_path, workers=1)
+        alone = Clone.of_the_working_tree(tmp_path)
+        params = (ROOT / "tests" / "params.yaml").read_text()
+        (tmp_path / "params.yaml").write_text(params.replace("workers: 2", "workers: 1"))
+        (tmp_path / "dvc.lock").unlink()
         alone.dvc("repro")
         assert (alone.folder / TIMING).read_bytes() != (clone.folder / TIMING).read_bytes()
         shutil.copy(clone.folder / TIMING, alone.folder / TIMING)
@@ -274,15 +296,25 @@ class TestSmallProfile:
         assert "index.html" in clone.dvc("plots", "show")
         assert "train_policy@place" in clone.dvc("dag")
 
-    def test_an_experiment_reruns_only_what_it_changes(self, clone: Clone) -> None:
+    def test_the_page_on_experiments_runs_as_written(self, clone: Clone, tmp_path: Path) -> None:
         before = clone.lock()
-        output = clone.dvc("exp", "run", "-S", "train_policy.place.dropout=0.3", "train_policy")
-        assert "Running stage 'train_policy@place'" in output
-        assert output.count("Running stage") == 1
-        after = clone.lock()
-        assert [name for name in after if after[name] != before[name]] == ["train_policy@place"]
-        assert "evaluate_generalization" in clone.dvc("status")
-        assert clone.dvc("metrics", "diff", "--all").count("summary.json") <= 15
+        run, show, diff, mlflow, times, back, remote, push = commands(ROOT / "docs/experiments.md")
+        output = clone.command("bash", "-euc", run)
+        changed = [name for name, stage in clone.lock().items() if stage != before[name]]
+        assert changed[0] == "train_policy@place"
+        assert changed[1:] == ["evaluate_generalization", "compare_scalability", "render_reports"]
+        assert re.findall(r"Running stage '([\w@]+)'", output) == changed
+        assert "dropout" in clone.command("bash", "-euc", show)
+        assert "index.html" in clone.command("bash", "-euc", diff)
+        assert 0 < clone.dvc("metrics", "diff", "--all").count("summary.json") <= 15
+        assert mlflow.startswith("make mlflow")
+        assert "a.1" in clone.command("bash", "-euc", times)
+        clone.command("bash", "-euc", back)
+        assert clone.lock() == before
+        assert "up to date" in clone.dvc("status", "dvc.yaml")
+        clone.command("bash", "-euc", remote.replace("ssh://HOST/PATH", str(tmp_path)))
+        clone.command("bash", "-euc", push)
+        assert list(tmp_path.iterdir())
 
     def test_bad_parameters_stop_a_stage_before_it_computes(self, clone: Clone) -> None:
         file = clone.folder / "params.yaml"
