@@ -2,12 +2,13 @@
 
 import logging
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
+from guided_lgp.bounds.coordination import CoordinatedBounds, Coordinator
 from guided_lgp.bounds.deadline import Deadline, OutOfTimeError
 from guided_lgp.bounds.goals import GoalTerms
 from guided_lgp.bounds.path.assembly import stay
@@ -121,6 +122,7 @@ def plan(
     domain: str | None = None,
     skeleton: str | Skeleton = (),
     candidates: int = 1,
+    coordinate: bool = True,
     where: str = "scene",
 ) -> PlanningResult:
     """Find a sequence of actions and its motion such that all goals hold at the end.
@@ -143,6 +145,9 @@ def plan(
             one action a line. If the goals hold after them, or there are none, they are the plan.
         candidates: how many plans to compare at most: the result is the one of the fewest actions,
             of several the one of the shortest duration.
+        coordinate: whether all arms move at once where they can, with limited jerk and no way home
+            that is not needed; actions of two arms may then change places, unless they are given.
+            Otherwise one arm moves at a time.
         where: the scene's file, for messages.
 
     Returns:
@@ -182,11 +187,14 @@ def plan(
     if finding := TaskFacts(scene_bounds, goals, misplaced).before_search():
         return _without_search(scene, goals, None, finding)
     search, followed = _guidance(planner, policy, models, scene)
+    observe: Callable[[SceneBounds], ObservedBounds] = ObservedBounds
+    if coordinate:
+        observe = partial(_observe, deadline=deadline, objective=goals, in_order=bool(prefix))
     problem = Problem(
         scene,
         goals,
         _limits(params.compare_scalability, scene, goals, prefix, max_nodes),
-        ObservedBounds(scene_bounds),
+        observe(scene_bounds),
         followed,
         parts=scene_bounds,
         misplaced=misplaced,
@@ -194,7 +202,7 @@ def plan(
         candidates=candidates,
         deadline=deadline,
     )
-    attempts = _Attempts(problem)
+    attempts = _Attempts(problem, observe)
     if prefix and satisfied(progress(scene.state, prefix), goals):
         return attempts.result(_only_timed(problem))
     if not chosen:
@@ -225,8 +233,9 @@ def _only_timed(problem: Problem) -> SearchResult:
 class _Attempts:
     """A problem, and the same with further instructions where a search has asked for them."""
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, observe: Callable[[SceneBounds], ObservedBounds]) -> None:
         self.first = self._last = problem
+        self._observe = observe
 
     def widened(self, params: BoundsParams) -> Problem | None:
         """The problem with further instructions, if a goal needs them and there is time to tell."""
@@ -242,7 +251,7 @@ class _Attempts:
         self._last = replace(
             problem,
             scene=scene,
-            bounds=ObservedBounds(bounds),
+            bounds=self._observe(bounds),
             parts=bounds,
             policy=problem.policy if knows else Uniform(),
         )
@@ -265,6 +274,15 @@ class _Attempts:
             obstacles=() if found.solved else obstacles,
             finding=None if found.solved else _finding(problem, obstacles),
         )
+
+
+def _observe(
+    bounds: SceneBounds, deadline: Deadline, objective: Objective, in_order: bool
+) -> ObservedBounds:
+    """The bounds of a scene as the search uses them, with motions of all arms at once."""
+    goals = GoalTerms.of(objective, bounds.scene.symbols.domain)
+    coordinator = Coordinator(bounds.scene, deadline, goals, in_order)
+    return ObservedBounds(CoordinatedBounds(bounds, coordinator))
 
 
 def _observed(problem: Problem) -> ObservedBounds:

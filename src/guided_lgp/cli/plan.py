@@ -96,6 +96,15 @@ def plan(
             "one of the shortest duration.",
         ),
     ] = 1,
+    coordinate: Annotated[
+        bool,
+        typer.Option(
+            "--coordinate/--no-coordinate",
+            help="Let all arms move at once, with limited jerk and without ways home that are not "
+            "needed; actions of two arms may change places, unless they are given. Or one arm at "
+            "a time.",
+        ),
+    ] = True,
     max_nodes: Annotated[
         int | None,
         typer.Option(
@@ -194,6 +203,7 @@ def plan(
             domain=domain,
             skeleton=skeleton or (),
             candidates=candidates,
+            coordinate=coordinate,
             where=str(scene),
         )
     start, objective = result.scene, result.objective

@@ -3,7 +3,8 @@
 A trajectory controller moves along a cubic through the positions and velocities of two points, or
 along a quintic through their accelerations, too. Here both stay on the planned path and within the
 robot's limits: the motion is cut where it rests; each such *leg* gets a cubic spline from rest to
-rest, and more time where one of the two curves would exceed a limit.
+rest, and more time where one of the two curves would exceed a limit. Where arms move at once, the
+rows of a plan are equally far apart in time, and one arm may move while another one rests.
 """
 
 from collections.abc import Iterator
@@ -30,7 +31,10 @@ _SAMPLES = 33
 
 @dataclass(frozen=True)
 class Segment:
-    """The rows of one action, from where the one before ended; the robot rests at both."""
+    """The rows of one action, from where the one before ended.
+
+    The robot rests at both; where arms move at once, an action ends as it takes effect.
+    """
 
     action: str
     start: int
@@ -143,13 +147,18 @@ def _limits(robot: Robot, joint_names: tuple[str, ...]) -> tuple[Array, Array]:
 
 
 def _legs(trajectory: Trajectory, switches: list[int]) -> Iterator[tuple[int, int]]:
-    """First and last row of every leg: a new one has other joints, another step, or a switch."""
+    """First and last row of every leg: a new one has other joints, another step, or a switch.
+
+    Where all steps are equal, arms may move on while another one's action takes effect.
+    """
     steps = np.diff(trajectory.times)
+    together = np.ptp(steps) <= _SAME_STEP
     moving = np.diff(trajectory.q, axis=0) != 0.0
     other_joints = ~(moving[1:] & moving[:-1]).any(axis=1)
     other_step = np.abs(np.diff(steps)) > _SAME_STEP
     rests = {int(row) + 1 for row in np.flatnonzero(other_joints | other_step)}
-    yield from pairwise(sorted({0, *rests, *switches, len(trajectory.times) - 1}))
+    switched = [] if together else switches
+    yield from pairwise(sorted({0, *rests, *switched, len(trajectory.times) - 1}))
 
 
 def _timed(
@@ -188,7 +197,8 @@ def _segments(
 ) -> Iterator[Segment]:
     """An action ends where the arms are home again after its switch.
 
-    Where they go on to the next action without that, it ends when its fingers have moved.
+    Where they go on to the next action without that, it ends when its fingers have moved, or, if
+    another arm moves then, with its switch.
     """
     robot, names = plan.scene.robot.description, trajectory.joint_names
     arms = [names.index(joint) for joint in robot.joint_names]
@@ -200,7 +210,8 @@ def _segments(
         rests = [row for _, row in legs if switch <= row < following]
         home = [row for row in rests if away[row] < _HOME]
         moved = [row for row in rests if np.array_equal(*trajectory.q[[switch, row]][:, arms])]
-        end = rests[-1] if following == len(trajectory.times) else (home or moved[::-1])[0]
+        last = following == len(trajectory.times)
+        end = rests[-1] if last else [*home, *reversed(moved), switch][0]
         yield Segment(action, start, end)
         start = end
 
@@ -213,6 +224,13 @@ def _commands(
             continue
         column = trajectory.joint_names.index(arm.fingers.joints[0])
         values = trajectory.q[:, column] / arm.fingers.ratios[0]
-        for start, end in legs:
-            if values[start] != values[end]:
+        for leg in legs:
+            for start, end in _runs(values, *leg):
                 yield GripperCommand(gripper, start, arm.fingers.opening(float(values[end])))
+
+
+def _runs(values: Array, first: int, last: int) -> Iterator[tuple[int, int]]:
+    """First and last row of every stretch of a leg in which fingers move."""
+    moving = np.diff(values[first : last + 1]) != 0.0
+    turns = np.flatnonzero(np.diff(np.pad(moving.astype(int), 1))) + first
+    yield from zip(turns[::2].tolist(), turns[1::2].tolist(), strict=True)

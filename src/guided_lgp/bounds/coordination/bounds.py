@@ -1,0 +1,35 @@
+"""The bounds of a scene, with paths in which all arms move."""
+
+from typing import Protocol
+
+from guided_lgp.bounds.coordination.coordinate import Coordinator
+from guided_lgp.bounds.results import CoarseResult, PathResult
+from guided_lgp.logic import Skeleton
+
+
+class _Bounds(Protocol):
+    def coarse(self, skeleton: Skeleton) -> CoarseResult: ...
+
+    def path(self, skeleton: Skeleton) -> PathResult: ...
+
+
+class CoordinatedBounds:
+    """Bounds whose paths are shortened as soon as they are found."""
+
+    def __init__(self, bounds: _Bounds, coordinator: Coordinator) -> None:
+        self._bounds = bounds
+        self._coordinator = coordinator
+        self._paths: dict[Skeleton, PathResult] = {}
+
+    def coarse(self, skeleton: Skeleton) -> CoarseResult:
+        """One verified configuration per action, or why there is none."""
+        return self._bounds.coarse(skeleton)
+
+    def path(self, skeleton: Skeleton) -> PathResult:
+        """The verified motion of all arms for a skeleton, or why there is none."""
+        result = self._paths.get(skeleton)
+        if result is None:
+            found = self._bounds.path(skeleton)
+            result = self._coordinator.shorten(found) if found.feasible else found
+            self._paths[skeleton] = result
+        return result

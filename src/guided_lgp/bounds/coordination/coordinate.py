@@ -1,0 +1,107 @@
+"""From a verified plan to a shorter one that is verified as well."""
+
+import time
+from contextlib import suppress
+from dataclasses import replace
+from functools import cached_property
+
+from guided_lgp.bounds.coordination.itinerary import Itinerary, itinerary
+from guided_lgp.bounds.coordination.moments import Moments
+from guided_lgp.bounds.coordination.roads import Road
+from guided_lgp.bounds.coordination.schedule import schedule
+from guided_lgp.bounds.coordination.timetable import Timetable
+from guided_lgp.bounds.deadline import NEVER, Deadline, OutOfTimeError
+from guided_lgp.bounds.goals import NO_TERMS, GoalTerms
+from guided_lgp.bounds.path.motions import Mover
+from guided_lgp.bounds.path.situation import situation_at_start
+from guided_lgp.bounds.results import PathResult
+from guided_lgp.bounds.verify import verify_path
+from guided_lgp.logic import Skeleton
+from guided_lgp.scene import Scene
+from guided_lgp.scene.world import world_of
+
+_ATTEMPTS = 4
+"""Schedules that are verified, each without the faults of those before."""
+
+
+class Coordinator:
+    """Shortens the plans of one scene."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        deadline: Deadline = NEVER,
+        goals: GoalTerms = NO_TERMS,
+        in_order: bool = False,
+    ) -> None:
+        """Prepare for one scene.
+
+        Args:
+            scene: the initial configuration.
+            deadline: after which it gives up.
+            goals: terms that the motion keeps.
+            in_order: whether all actions take effect one after the other as they are given.
+        """
+        self._scene = scene
+        self._deadline, self._in_order = deadline, in_order
+        self._goals = goals
+        self._start = situation_at_start(scene, goals.upright)
+
+    @cached_property
+    def _mover(self) -> Mover:
+        """Made when first needed: most searches end without a path."""
+        return Mover(self._scene, 0, self._deadline)
+
+    def shorten(self, result: PathResult) -> PathResult:
+        """The same actions in less time; actions of two arms may change places.
+
+        Args:
+            result: a motion that the path bound has found.
+
+        Returns:
+            The new motion, or ``result`` where none is found in time.
+        """
+        if not result.skeleton:
+            return result
+        began = time.perf_counter()
+        plan = itinerary(
+            self._start, result.skeleton, result.steps, self._mover.arms, self._in_order
+        )
+        for unwinds in (True, False):
+            with suppress(OutOfTimeError):
+                motion = self._scheduled(result.skeleton, plan, unwinds)
+                if motion is not None:
+                    elapsed = result.time_s + time.perf_counter() - began
+                    return replace(motion, steps=result.steps, time_s=elapsed)
+        return result
+
+    def _scheduled(self, skeleton: Skeleton, plan: Itinerary, unwinds: bool) -> PathResult | None:
+        """A verified motion by the ways of all arms."""
+        busy = sum(len(stops) > 1 for stops in plan.stops.values())
+        roads = {
+            gripper: Road(self._mover, gripper, stops, busy > 1, unwinds)
+            for gripper, stops in plan.stops.items()
+        }
+        moments = Moments(self._scene, roads, plan)
+        for _ in range(_ATTEMPTS):
+            self._deadline.check()
+            found = schedule(roads, moments)
+            if found is None:
+                return None
+            motion = Timetable(self._scene, roads, plan, found)
+            actions = tuple(skeleton[number] for number, _ in motion.switches)
+            trajectory = motion.trajectory(actions)
+            report = verify_path(world_of(self._scene), actions, trajectory, self._goals)
+            if report.violation is None:
+                return PathResult(
+                    actions,
+                    feasible=True,
+                    trajectory=trajectory,
+                    at_switch=motion.keyframes(self._mover.arms),
+                    verification={
+                        "configurations": report.configurations,
+                        "deepest_penetration_m": report.deepest_penetration,
+                    },
+                )
+            moments.block(found[motion.row_at(report.violation.time)])
+        return None

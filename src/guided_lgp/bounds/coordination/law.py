@@ -1,0 +1,97 @@
+"""Time laws with limited jerk, on a clock that all arms share.
+
+A path is first followed as fast as velocities and accelerations allow. Then every configuration
+becomes the mean of those of the last ``SMOOTHING`` seconds: an acceleration that jumped from one
+limit to the other now takes so long for it. Every motion lasts a whole number of ticks, so that the
+motions of several arms have common rows.
+"""
+
+import numpy as np
+
+from guided_lgp.bounds.path.spline import Cubic
+from guided_lgp.bounds.path.timing import time_path
+from guided_lgp.bounds.results import Array
+from guided_lgp.robots import Arm
+from guided_lgp.robots.robot import Fingers
+
+TICK = 0.05
+"""Time (s) between two rows."""
+SMOOTHING = 0.1
+"""Time (s) over which configurations are averaged: twice the acceleration limit over it is the
+jerk at most, twenty times the limit per second."""
+_FINE = 4
+"""Samples per tick that are averaged."""
+_SHARE = 0.99
+"""Share of the limits that is used, so that the rounded rows keep them too."""
+_FINGER_SHARE = 0.9
+"""Share of their velocity limit at which fingers move."""
+
+
+def jerk_limited(path: Array, arm: Arm, slower: float = 1.0) -> Array:
+    """Follow a path of one arm from rest to rest.
+
+    Args:
+        path: configurations (m, n) in rad, close enough for a cubic spline to stay on the path.
+        arm: whose it is.
+        slower: how many times longer it takes than it could.
+
+    Returns:
+        Configurations (T, n), one per tick.
+    """
+    times, rows = time_path(path, arm)
+    if len(times) == 1:
+        return rows
+    fastest = slower * times[-1]
+    while True:
+        ticks = int(np.ceil((fastest + SMOOTHING) / TICK - 1e-9))
+        duration = ticks * TICK - SMOOTHING
+        still = np.zeros(rows.shape[1])
+        curve = Cubic(times * (duration / times[-1]), rows, still, still)
+        smooth = _averaged(curve, duration, ticks)
+        smooth[0], smooth[-1] = rows[0], rows[-1]
+        excess = _excess(smooth, arm)
+        if excess <= 1.0:
+            return smooth
+        fastest = duration * max(excess, 1.01)
+
+
+def ramp(fingers: Fingers, start: float, end: float) -> Array:
+    """Values (T,) of fingers from one to another, one per tick, without a jump of the speed."""
+    duration = abs(end - start) / (_FINGER_SHARE * fingers.velocity)
+    ticks = int(np.ceil((duration + SMOOTHING) / TICK - 1e-9)) if end != start else 0
+    moves = max(ticks * TICK - SMOOTHING, 1e-6)
+    fine = np.clip(_window_times(ticks) / moves, 0.0, 1.0)
+    values = np.asarray(start + (end - start) * fine.mean(axis=1))
+    values[-1] = end
+    return values
+
+
+def _window_times(ticks: int) -> Array:
+    """Times (ticks + 1, samples) in the window of every row, before the first one below zero."""
+    count = round(SMOOTHING / TICK * _FINE)
+    within = (np.arange(count) + 0.5) / count * SMOOTHING - SMOOTHING
+    return np.asarray(TICK * np.arange(ticks + 1)[:, None] + within)
+
+
+def _averaged(curve: Cubic, duration: float, ticks: int) -> Array:
+    """Means (ticks + 1, n) of a curve over the window of every row."""
+    times = np.clip(_window_times(ticks), 0.0, duration)
+    places, where = np.unique(times, return_inverse=True)
+    return np.asarray(curve(places)[where.reshape(times.shape)].mean(axis=1))
+
+
+def _excess(rows: Array, arm: Arm) -> float:
+    """The factor on time that brings rows (T, n) within the limits, before and after at rest."""
+    rates = np.diff(np.pad(rows, ((3, 3), (0, 0)), mode="edge"), axis=0) / TICK
+    changes = np.diff(rates, axis=0) / TICK
+    jerks = np.diff(changes, axis=0) / TICK
+    limits = (
+        _SHARE * arm.velocity_limits,
+        _SHARE * arm.acceleration_limits,
+        _SHARE * arm.jerk_limits,
+    )
+    shares = [
+        float(np.max(np.abs(values) / limit))
+        for values, limit in zip((rates, changes, jerks), limits, strict=True)
+    ]
+    return float(max(shares[0], shares[1] ** (1 / 2), shares[2] ** (1 / 3)))

@@ -1,0 +1,126 @@
+"""Whether all arms, each somewhere on its way, are clear of each other and of every body."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from guided_lgp.bounds.collision import PlanningScene, checker_of
+from guided_lgp.bounds.coordination.itinerary import Itinerary
+from guided_lgp.bounds.coordination.roads import Edge, Node, Road
+from guided_lgp.bounds.results import Array
+from guided_lgp.scene import Scene
+
+_FINE = np.array([0.5, 1.0])
+"""Where between two rows configurations are checked."""
+_COARSE = 6
+"""Every so-many-th moment is looked at first: what collides is found soon."""
+
+Position = tuple[Edge | Node, int]
+"""A row of a motion, or a place where an arm rests."""
+Moment = tuple[Position, ...]
+"""Where all arms are, in the order of the robot."""
+
+
+def later(position: Position, ticks: int) -> Position:
+    """Where an arm is some ticks after."""
+    where, row = position
+    return position if isinstance(where, Node) else (where, row + ticks)
+
+
+class Moments:
+    """Looks for collisions, once for each moment."""
+
+    def __init__(self, scene: Scene, roads: Mapping[str, Road], plan: Itinerary) -> None:
+        self._checker = checker_of(scene)
+        self._robot = scene.robot.description
+        self._roads = list(roads.values())
+        self._plan = plan
+        self._actions = [
+            {number: stop.contact for number, stop in enumerate(stops) if stop.acts}
+            for stops in plan.stops.values()
+        ]
+        self._clear: dict[Moment, bool] = {}
+        self._scenes: dict[tuple[frozenset[int], frozenset[int]], PlanningScene] = {}
+
+    def clear(self, start: Moment, ticks: int) -> bool:
+        """Whether all arms go on from a moment for some ticks without a collision."""
+        moments = [tuple(later(at, tick) for at in start) for tick in range(1, ticks + 1)]
+        if not all(self._clear.get(moment, True) for moment in moments):
+            return False
+        unknown = [moment for moment in moments if moment not in self._clear]
+        for step in (_COARSE, 1):
+            some = [moment for moment in unknown[::-step] if moment not in self._clear]
+            if some and not self._judge(some):
+                return False
+        return True
+
+    def block(self, moment: Moment) -> None:
+        """Never come to a moment again."""
+        self._clear[moment] = False
+
+    def over(self, moment: Moment) -> list[int]:
+        """The last stop of every arm that is over."""
+        return [
+            road.over(where) if isinstance(where, Node) else where.over
+            for road, (where, _) in zip(self._roads, moment, strict=True)
+        ]
+
+    def _judge(self, moments: Sequence[Moment]) -> bool:
+        """Whether moments between which no action takes effect are clear."""
+        self._checker.enter(self._scene(moments[0]))
+        rows = np.concatenate([self._rows(moment) for moment in moments])
+        free = self._checker.free(rows).reshape(len(moments), -1)
+        self._clear |= {
+            moment: bool(clear.all()) for moment, clear in zip(moments, free, strict=True)
+        }
+        return bool(free.all())
+
+    def _rows(self, moment: Moment) -> Array:
+        """All moving joints (m, joints) on the way from the tick before."""
+        rows = np.empty((len(_FINE), len(self._robot.moving_joints)))
+        arms = self._robot.arms.values()
+        for arm, road, (where, row) in zip(arms, self._roads, moment, strict=True):
+            if isinstance(where, Node):
+                rows[:, arm.slice], fingers = road.rest(where)
+                rows[:, arm.fingers.slice] = fingers * arm.fingers.ratios
+                continue
+            steps = where.q[row - 1] + _FINE[:, None] * (where.q[row] - where.q[row - 1])
+            rows[:, arm.slice] = steps
+            values = where.fingers[row - 1] + _FINE * (where.fingers[row] - where.fingers[row - 1])
+            rows[:, arm.fingers.slice] = values[:, None] * arm.fingers.ratios
+        return rows
+
+    def _scene(self, moment: Moment) -> PlanningScene:
+        """What is where, and what may touch."""
+        done = frozenset(
+            action
+            for actions, over in zip(self._actions, self.over(moment), strict=True)
+            for number, action in actions.items()
+            if number <= over and action is not None
+        )
+        contacts = frozenset(
+            contact
+            for road, (where, _) in zip(self._roads, moment, strict=True)
+            for contact in (road.contacts(where) if isinstance(where, Node) else where.contacts)
+        )
+        if (done, contacts) not in self._scenes:
+            self._scenes[done, contacts] = self._made(done, contacts)
+        return self._scenes[done, contacts]
+
+    def _made(self, done: frozenset[int], contacts: frozenset[int]) -> PlanningScene:
+        bodies = self._plan.bodies(done)
+        held = {frozenset((box, hand)) for box, hand in bodies.holders.items() if hand is not None}
+        at_contact = {
+            frozenset((change.body, other))
+            for change in (self._plan.changes[number] for number in contacts)
+            for other in change.contacts
+            if bodies.holders.get(change.body) in (None, *change.contacts)
+        }
+        first, *others = self._robot.grippers
+        return PlanningScene(
+            first,
+            bodies.standing,
+            bodies.carried,
+            frozenset(held | at_contact),
+            frozenset(others),
+        )

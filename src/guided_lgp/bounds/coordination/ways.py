@@ -1,0 +1,145 @@
+"""The paths of one arm from one stop to the next: straight on, or by its side."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from guided_lgp.bounds.coordination.itinerary import Stop
+from guided_lgp.bounds.path.motions import Motion, Mover, Transit
+from guided_lgp.bounds.path.optimise import optimal_path
+from guided_lgp.bounds.results import Array
+from guided_lgp.robots import PlacedArm
+
+_GUESS = 12
+"""Configurations of a straight line in joint space from which a path is optimised."""
+_LEG = 3
+"""Steps (of about a centimetre) that a hand goes straight at least, off a contact or to one."""
+
+
+@dataclass(frozen=True)
+class Way:
+    """Paths (m, n) with rests between them; the first and the last row may be of a straight way."""
+
+    pieces: tuple[Array, ...]
+    out: int
+    """Rows that lead straight off a contact ..."""
+    into: int
+    """... and to one; none, or at least two."""
+
+    @property
+    def before_contact(self) -> "Way":
+        """The same without the straight way to a contact."""
+        *others, last = self.pieces
+        rest = last[: len(last) - self.into + 1]
+        return Way((*others, rest) if len(rest) > 1 else tuple(others), self.out, 0)
+
+
+class Gap:
+    """What is between two stops of an arm."""
+
+    def __init__(
+        self, mover: Mover, arm: PlacedArm, stops: tuple[Stop, Stop], turns: Array
+    ) -> None:
+        """Prepare.
+
+        Args:
+            mover: finds free paths.
+            arm: whose they are.
+            stops: from the first to the second.
+            turns: (2, n) full turns (rad) by which joints are wound more than the path bound had
+                them, at either.
+        """
+        self._mover, self._arm = mover, arm
+        self._motions = stops[1].motions
+        self.start, self.end = stops[0].q + turns[0], stops[1].q + turns[1]
+        self._wound = not np.array_equal(*turns)
+        self._turn = turns[0]
+        way_out, way_in = stops[1].way_out, stops[1].way_in
+        self._way_out = self.start[None] if way_out is None else way_out + turns[0]
+        self._way_in: Array = self.end[None] if way_in is None else way_in + turns[1]
+
+    @cached_property
+    def direct(self) -> Way | None:
+        """Straight on, or None if nothing has been found."""
+        if not self._motions:
+            return _way(self._way_out, (), self._way_in)
+        return self._joined(self._motions)
+
+    @cached_property
+    def to_side(self) -> Way | None:
+        """To the arm's side, if the path bound has been there on its way."""
+        return None if self._side is None else self._joined(self._motions[: self._side])
+
+    @cached_property
+    def from_side(self) -> Way | None:
+        """On from there."""
+        return None if self._side is None else self._joined(self._motions[self._side :])
+
+    @cached_property
+    def into(self) -> Array:
+        """The straight way (m, n) to the contact, as short as can be."""
+        if not self._motions:
+            return self._way_in
+        way = self._shortened(self._way_in[::-1], self._motions[-1])
+        return np.asarray(way[::-1])
+
+    @cached_property
+    def _side(self) -> int | None:
+        """How many motions lead to the arm's side, if it goes on from there."""
+        home = self._arm.arm.home
+        ends = [np.array_equal(motion.path[-1], home) for motion in self._motions[:-1]]
+        return ends.index(True) + 1 if True in ends else None
+
+    def _shortened(self, way: Array, motion: Motion) -> Array:
+        """The beginning (m, n) of a way off a contact after which nothing touches any more."""
+        assert motion.transit is not None
+        for row in range(_LEG, len(way) - 1):
+            if self._mover.collision(motion.transit.surroundings, way[row, None]) is None:
+                return np.asarray(way[: row + 1])
+        return way
+
+    def _joined(self, motions: Sequence[Motion]) -> Way | None:
+        """Some motions in one, and with the straight ways before and after, if possible."""
+        leaves, arrives = motions[0] is self._motions[0], motions[-1] is self._motions[-1]
+        side = self._arm.arm.home + self._turn
+        out = self._shortened(self._way_out, motions[0]) if leaves else side[None]
+        into = self.into if arrives else side[None]
+        found = [path + self._turn for path in (motion.path for motion in motions)]
+        if leaves:
+            found.insert(0, self._way_out[len(out) - 1 :])
+        if arrives:
+            found.append(self._way_in[: len(self._way_in) - len(into) + 1])
+        transit = motions[-1].transit
+        assert transit is not None
+        path = self._free(transit, out, found, into)
+        if path is not None:
+            whole = np.concatenate([out, path[1:], into[1:]])
+            return Way((whole,), _straight(out), _straight(into))
+        return None if self._wound and arrives else _way(out, found, into)
+
+    def _free(
+        self, transit: Transit, out: Array, found: Sequence[Array], into: Array
+    ) -> Array | None:
+        """The best free path (m, n) between two straight ways, begun from the line between them or
+        from what has been found.
+        """
+        lines = (out if len(out) > 1 else None), (into if len(into) > 1 else None)
+        detour = np.concatenate([out[-1:], *found, into[:1]])
+        guesses = [] if transit.keep_level else [np.linspace(out[-1], into[0], _GUESS)]
+        if not self._wound:
+            guesses.append(detour)
+        paths = (optimal_path(self._mover, transit, guess, *lines) for guess in guesses)
+        return next((path for path in paths if path is not None), None)
+
+
+def _way(out: Array, free: Sequence[Array], into: Array) -> Way:
+    """A rest after every path."""
+    pieces = tuple(path for path in (out, *free, into) if len(path) > 1)
+    return Way(pieces or (out[[0, 0]],), _straight(out), _straight(into))
+
+
+def _straight(way: Array) -> int:
+    """The rows of a straight way; one row is none."""
+    return len(way) if len(way) > 1 else 0

@@ -1,0 +1,149 @@
+"""Plans in which all arms move: shorter, verified as one motion, and within every limit."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from guided_lgp.bounds.coordination import Coordinator
+from guided_lgp.bounds.coordination.itinerary import Itinerary, itinerary
+from guided_lgp.bounds.coordination.law import TICK, jerk_limited, ramp
+from guided_lgp.bounds.path.situation import situation_at_start
+from guided_lgp.bounds.results import PathResult, Trajectory
+from guided_lgp.bounds.scene_bounds import SceneBounds
+from guided_lgp.bounds.verify import verify_path
+from guided_lgp.bounds.verify.attachments import switches_of
+from guided_lgp.bounds.verify.joints import rows_outside_limits
+from guided_lgp.logic import format_skeleton, parse_skeleton
+from guided_lgp.params import load_planning
+from guided_lgp.robots import PlacedArm, load_robot
+from guided_lgp.scene import Scene, load_scene
+from guided_lgp.scene.world import world_of
+
+PR2 = load_robot("pr2")
+EXAMPLE = Path(__file__).parents[2] / "examples" / "three_boxes.json"
+APART = "(grasp pr2L red) (place pr2L red tab1) (grasp pr2R green) (place pr2R green tab2)"
+ON_HELD = "(grasp pr2R green) (grasp pr2L red) (place pr2L red green)"
+
+
+def sequential(actions: str) -> tuple[Scene, PathResult]:
+    scene = load_scene(EXAMPLE)
+    return scene, SceneBounds(scene, load_planning().bounds).path(parse_skeleton(actions))
+
+
+@pytest.fixture(scope="module")
+def apart() -> tuple[Scene, PathResult]:
+    """Two arms that have nothing to do with each other."""
+    return sequential(APART)
+
+
+@pytest.fixture(scope="module")
+def together(apart: tuple[Scene, PathResult]) -> PathResult:
+    scene, result = apart
+    return Coordinator(scene).shorten(result)
+
+
+def motion(result: PathResult) -> Trajectory:
+    assert result.trajectory is not None
+    return result.trajectory
+
+
+def plan_of(scene: Scene, result: PathResult, in_order: bool = False) -> Itinerary:
+    base, fixed = scene.robot.base_pose, scene.robot.fixed_values
+    arms = {gripper: PlacedArm(PR2, gripper, base, fixed) for gripper in PR2.grippers}
+    start = situation_at_start(scene)
+    return itinerary(start, result.skeleton, result.steps, arms, in_order)
+
+
+def test_both_arms_need_half_the_time(
+    apart: tuple[Scene, PathResult], together: PathResult
+) -> None:
+    assert motion(together).times[-1] < 0.6 * motion(apart[1]).times[-1]
+    assert sorted(map(str, together.skeleton)) == sorted(map(str, apart[1].skeleton))
+    assert len(together.at_switch) == len(together.skeleton)
+
+
+def test_no_row_is_outside_any_limit(apart: tuple[Scene, PathResult], together: PathResult) -> None:
+    scene, trajectory = apart[0], motion(together)
+    switches = switches_of(scene, together.skeleton, trajectory)
+    assert isinstance(switches, list)
+    columns = [trajectory.joint_names.index(name) for name in PR2.moving_joints]
+    q = trajectory.q[:, columns]
+    outside = rows_outside_limits(scene, together.skeleton, switches, q, trajectory.times)
+    assert "jerk" in outside
+    assert set(outside.values()) == {0}
+
+
+def test_arms_move_at_once(together: PathResult) -> None:
+    moving = [
+        np.any(np.diff(motion(together).q[:, arm.slice], axis=0), axis=1)
+        for arm in PR2.arms.values()
+    ]
+    assert np.mean(moving[0] & moving[1]) > 0.5
+
+
+def test_the_same_plan_twice(apart: tuple[Scene, PathResult], together: PathResult) -> None:
+    again = Coordinator(apart[0]).shorten(apart[1])
+    assert again.skeleton == together.skeleton
+    assert np.array_equal(motion(again).q, motion(together).q)
+
+
+def test_a_given_order_is_kept(apart: tuple[Scene, PathResult]) -> None:
+    scene, result = apart
+    kept = Coordinator(scene, in_order=True).shorten(result)
+    assert format_skeleton(kept.skeleton) == APART
+    assert motion(kept).times[-1] < motion(result).times[-1]
+
+
+def test_a_hand_waits_for_what_happens_on_what_it_holds() -> None:
+    scene, result = sequential(ON_HELD)
+    stops = plan_of(scene, result).stops
+    (number, placing), *_ = [
+        (i, stop) for i, stop in enumerate(stops["pr2L"]) if stop.acts and stop.contact == 2
+    ]
+    assert set(placing.way_in_after) == {"pr2R"}
+    waiting = stops["pr2R"][placing.way_in_after["pr2R"]]
+    assert waiting.leave_after == {"pr2L": number + 1}
+    assert placing.after["pr2R"] == 1
+    shorter = Coordinator(scene).shorten(result)
+    assert motion(shorter).times[-1] < motion(result).times[-1]
+    assert verify_path(world_of(scene), shorter.skeleton, motion(shorter)).violation is None
+
+
+def test_actions_apart_may_change_places(apart: tuple[Scene, PathResult]) -> None:
+    plan = plan_of(*apart)
+    assert not any(stop.after for stops in plan.stops.values() for stop in stops)
+    ordered = plan_of(*apart, in_order=True)
+    assert [stop.after for stop in ordered.stops["pr2R"] if stop.acts] == 2 * [{"pr2L": 2}]
+
+
+def test_what_cannot_be_shortened_stays(apart: tuple[Scene, PathResult]) -> None:
+    scene, result = apart
+    nothing = replace(result, skeleton=())
+    assert Coordinator(scene).shorten(nothing) is nothing
+
+
+@pytest.mark.parametrize("slower", [1.0, 3.0])
+def test_the_time_law_keeps_velocity_acceleration_and_jerk(slower: float) -> None:
+    arm = PR2.arms["pr2L"]
+    path = np.linspace(arm.home, arm.home + 0.4, 30)
+    path[:, 1] += 0.1 * np.sin(np.linspace(0, np.pi, 30))
+    rows = jerk_limited(path, arm, slower)
+    assert np.array_equal(rows[[0, -1]], path[[0, -1]])
+    rates = np.diff(np.pad(rows, ((3, 3), (0, 0)), mode="edge"), axis=0) / TICK
+    for order, limit in enumerate(
+        (arm.velocity_limits, arm.acceleration_limits, arm.jerk_limits), start=0
+    ):
+        assert np.all(np.abs(np.diff(rates, order, axis=0)) / TICK**order <= limit)
+    assert len(rows) > len(jerk_limited(path, arm)) - 1
+
+
+def test_fingers_start_and_stop_gently() -> None:
+    fingers = PR2.arms["pr2L"].fingers
+    values = ramp(fingers, 0.1, 0.3)
+    steps = np.diff(values) / TICK
+    assert (values[0], values[-1]) == (0.1, 0.3)
+    assert np.all(steps <= fingers.velocity)
+    assert steps[0] < 0.75 * steps.max()
+    assert ramp(fingers, 0.2, 0.2).tolist() == [0.2]
