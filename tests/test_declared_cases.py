@@ -1,5 +1,6 @@
 """Cases: refused before anything is computed, no scene twice, labels that are true, figures."""
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -7,13 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from typer.testing import CliRunner
 
 from guided_lgp import sources
 from guided_lgp.cases import collect, demonstrate, train
 from guided_lgp.cases.declared import declared_case
 from guided_lgp.cases.policies import FULL, SHUFFLED, SIGHTS, models_of
 from guided_lgp.cases.shards import run_kept
-from guided_lgp.documents import read_json, write_text
+from guided_lgp.cli import app
+from guided_lgp.documents import read_json, read_yaml, write_text
 from guided_lgp.domains import load_domain
 from guided_lgp.errors import InputError
 from guided_lgp.logic import applicable_actions
@@ -47,6 +50,22 @@ def changed(case: str = "rows", **update: Any) -> Params:
 def test_a_case_that_names_what_there_is_not_is_refused(update: dict[str, Any], fault: str) -> None:
     with pytest.raises(InputError, match=fault):
         declared_case(changed(**update), "rows")
+
+
+@pytest.mark.parametrize("file", ["params.yaml", "tests/params.yaml"])
+def test_there_is_a_stage_for_every_case_and_training(file: str) -> None:
+    """With all parameters that it names: those that are not there, DVC does not take."""
+    stages = read_yaml(ROOT / CASES)["stages"]
+    cases = read_yaml(ROOT / file)["cases"]
+    for stage in stages.values():
+        matrix = stage.get("matrix", {"case": stage.get("foreach", list(cases))})
+        assert matrix["case"] == list(cases)
+        for case in cases.values():
+            assert matrix.get("seed", case["seeds"]) == case["seeds"]
+            assert matrix.get("training", ["rivals", *case["seeds"]])[1:] == case["seeds"]
+            (listed,) = stage.get("do", stage)["params"]
+            sections = [text.partition("}.")[2] for text in listed["params.yaml"]]
+            assert {*sections} - {""} <= case.keys()
 
 
 def test_an_unknown_case_is_refused() -> None:
@@ -181,6 +200,18 @@ def test_figures() -> None:
         "path_verified_share": 0.5,
         "physics_share": 1.0,
     }
+
+
+def test_a_stage_is_a_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for case in PARAMS.cases:
+        shutil.copytree(ROOT / "reports" / case, tmp_path / "reports" / case)
+    shutil.copy(ROOT / "params.yaml", tmp_path)
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(app, ["collect_cases"])
+    assert done.exit_code == 0, done.output
+    assert read_json(tmp_path / collect.RESULTS) == read_json(ROOT / collect.RESULTS)
+    done = CliRunner().invoke(app, ["replay_case", "--case", "column"])
+    assert isinstance(done.exception, InputError)
 
 
 @pytest.mark.parametrize("name", PARAMS.cases)

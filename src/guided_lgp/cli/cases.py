@@ -1,8 +1,8 @@
 """The stages of the cases: families of problems where geometry decides."""
 
-from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -12,10 +12,16 @@ from guided_lgp.cli.stages import end_with_dvc
 from guided_lgp.cli.terminal import ParamsFile, TimeLimit
 from guided_lgp.paths import CASES, PARAMS
 
-if TYPE_CHECKING:
-    from guided_lgp.params import Params
-
 app = typer.Typer()
+
+STAGES = {
+    "demonstrate": "guided_lgp.cases.demonstrate",
+    "train_case": "guided_lgp.cases.train",
+    "evaluate_case": "guided_lgp.cases.evaluate",
+    "replay_case": "guided_lgp.cases.replay",
+    "collect_cases": "guided_lgp.cases.collect",
+}
+"""The module of each stage of cases/dvc.yaml; its ``run(params, root)`` does the work."""
 
 CaseName = Annotated[str, typer.Option("--case", help="A case of params.yaml.")]
 
@@ -26,15 +32,7 @@ def demonstrate(case: CaseName, params: ParamsFile = PARAMS, timeout: TimeLimit 
 
     Example: guided-lgp demonstrate --case rows
     """
-    from guided_lgp.cases import demonstrate
-
-    _run(
-        f"demonstrate@{case}",
-        case,
-        lambda root, read: demonstrate.run(read, root, case),
-        params,
-        timeout,
-    )
+    _run_stage("demonstrate", params, timeout, case)
 
 
 @app.command("train_case")
@@ -48,15 +46,7 @@ def train_case(
 
     Example: guided-lgp train_case --case rows --seed 1
     """
-    from guided_lgp.cases import train
-
-    _run(
-        f"train_case@{case}-{seed}",
-        case,
-        lambda root, read: train.run(read, root, case, seed),
-        params,
-        timeout,
-    )
+    _run_stage("train_case", params, timeout, case, seed)
 
 
 @app.command("evaluate_case")
@@ -70,12 +60,7 @@ def evaluate_case(
 
     Example: guided-lgp evaluate_case --case rows --training rivals
     """
-    from guided_lgp.cases import evaluate
-
-    def work(root: Path, read: "Params") -> None:
-        evaluate.run(read, root, case, training)
-
-    _run(f"evaluate_case@{case}-{training}", case, work, params, timeout)
+    _run_stage("evaluate_case", params, timeout, case, training)
 
 
 @app.command("replay_case")
@@ -84,15 +69,7 @@ def replay_case(case: CaseName, params: ParamsFile = PARAMS, timeout: TimeLimit 
 
     Example: guided-lgp replay_case --case rows
     """
-    from guided_lgp.cases import replay
-
-    _run(
-        f"replay_case@{case}",
-        case,
-        lambda root, read: replay.run(read, root, case),
-        params,
-        timeout,
-    )
+    _run_stage("replay_case", params, timeout, case)
 
 
 @app.command("collect_cases")
@@ -101,27 +78,24 @@ def collect_cases(params: ParamsFile = PARAMS, timeout: TimeLimit = None) -> Non
 
     Example: guided-lgp collect_cases
     """
-    from guided_lgp.cases import collect
-
-    _run("collect_cases", None, lambda root, read: collect.run(read, root), params, timeout)
+    _run_stage("collect_cases", params, timeout)
 
 
-def _run(
-    stage: str,
-    case: str | None,
-    work: "Callable[[Path, Params], None]",
-    params_file: Path,
-    timeout: float | None,
-) -> None:
-    """Check the parameters and the case, all of them for None, run a stage, and record it."""
+def _run_stage(stage: str, params_file: Path, timeout: float | None, *arguments: str | int) -> None:
+    """Check the parameters and the case, which comes first, then run a stage, and record it.
+
+    A stage without a case is about all of them.
+    """
     from guided_lgp import tracking
     from guided_lgp.cases.declared import declared_case
     from guided_lgp.params import load_params
 
     end_with_dvc()
     params, root = load_params(params_file), Path.cwd()
-    for name in params.cases if case is None else [case]:
-        declared_case(params, name)
-    address = f"{CASES}:{stage}"
+    for case in arguments[:1] or params.cases:
+        declared_case(params, str(case))
+    module = import_module(STAGES[stage])
+    name = "@".join(filter(None, [stage, "-".join(map(str, arguments))]))
+    address = f"{CASES}:{name}"
     with within(timeout, address), alone(root, address), tracking.recorded(address, params):
-        work(root, params)
+        module.run(params, root, *arguments)
