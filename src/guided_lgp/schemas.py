@@ -11,6 +11,7 @@ SCHEMAS = {
     "scene": "guided_lgp.scene.model:Scene",
     "robot": "guided_lgp.robots.document:RobotDocument",
     "plan": "guided_lgp.bounds.plan_file:Plan",
+    "observed": "guided_lgp.observed:Observed",
     "planning": "guided_lgp.params:PlanningParams",
     "params": "guided_lgp.params:Params",
 }

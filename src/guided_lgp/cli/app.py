@@ -8,7 +8,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from guided_lgp import __version__
-from guided_lgp.cli import cases, checks, dashboard, files, plan, stages
+from guided_lgp.cli import cases, checks, dashboard, execute, files, plan, replan, stages
 from guided_lgp.cli.running import run_program
 
 
@@ -47,7 +47,7 @@ PIPELINE = "The paper's pipeline"
 """The panel of the help that keeps its stages apart."""
 CASES = "Cases beside it"
 """That of the families where geometry decides."""
-GROUPS = (plan, files, checks, stages, cases)
+GROUPS = (plan, execute, replan, files, checks, stages, cases)
 for group in GROUPS:
     app.add_typer(group.app)
 for group in (*GROUPS, dashboard):

@@ -101,6 +101,7 @@ class Format(str, Enum):
     SCENE = "scene"
     ROBOT = "robot"
     PLAN = "plan"
+    OBSERVED = "observed"
     PLANNING = "planning"
     PARAMS = "params"
 

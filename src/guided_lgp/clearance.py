@@ -1,0 +1,107 @@
+"""How near a plan comes to what it does not touch."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+from guided_lgp.bounds.results import Trajectory
+from guided_lgp.bounds.verify.attachments import switches_of
+from guided_lgp.bounds.verify.phase import Phase
+from guided_lgp.bounds.verify.touching import touches
+from guided_lgp.logic import Skeleton, successor
+from guided_lgp.scene import Scene
+from guided_lgp.scene.world import World, initial_poses, world_of
+
+FARTHEST = 0.1
+"""m: nobody asks for more."""
+_EVERY = 3
+"""Every so-many-th sample of 1 cm is looked at: no point moves more than 3 cm in between."""
+
+
+@dataclass(frozen=True)
+class Clearance:
+    """The smallest distance of a moving part from a body that it does not touch."""
+
+    distance: float
+    """m, by the hulls of the meshes; ``FARTHEST`` where nothing comes nearer."""
+    part: str = ""
+    """A link, or a box in a hand."""
+    body: str = ""
+    """What it passes."""
+    time: float = 0.0
+    """s, when."""
+
+    def __str__(self) -> str:
+        if not self.part:
+            return f"more than {1000 * self.distance:.0f} mm"
+        place = f"{self.part} to {self.body} at {self.time:.1f} s"
+        return f"{1000 * self.distance:.1f} mm, {place}"
+
+
+def clearance_of(scene: Scene, skeleton: Skeleton, trajectory: Trajectory) -> Clearance:
+    """The smallest clearance of a plan.
+
+    Hand and box keep no distance while one takes or leaves the other, nor do a box and what it
+    stands on, before or after. Arms are not looked at against each other.
+
+    Args:
+        scene: the initial configuration.
+        skeleton: the actions.
+        trajectory: the motion, which has been verified.
+    """
+    rows = switches_of(scene, skeleton, trajectory)
+    if not isinstance(rows, list):
+        raise ValueError(f"the motion is not that of the actions: {rows.constraint}")
+    robot, world, nearest = scene.robot.description, world_of(scene), Clearance(FARTHEST)
+    q = trajectory.q[:, [trajectory.joint_names.index(name) for name in robot.moving_joints]]
+    states = [scene.state]
+    for action in skeleton:
+        states.append(successor(states[-1], action))
+    tools = scene.robot.tool_poses(q[:, : len(robot.joint_names)])
+    allowed = touches(scene, skeleton, rows, tools)
+    ends, boxes = [0, *rows, len(q) - 1], initial_poses(scene)
+    for index, (first, last) in enumerate(pairwise(ends)):
+        part = slice(first, last + 1)
+        phase = Phase(scene, states[index], boxes, q[part], trajectory.times[part])
+        around = states[max(index - 1, 0) : index + 2]
+        supports = {pair for state in around for pair in state.support}
+        touched = phase.touches(allowed, trajectory.times)
+        nearest = _nearest_of(world, phase, touched, supports, nearest)
+        boxes = phase.boxes_at(-1)
+    return nearest
+
+
+def _nearest_of(
+    world: World,
+    phase: Phase,
+    touched: list[set[tuple[str, str]]],
+    supports: set[tuple[str, str]],
+    nearest: Clearance,
+) -> Clearance:
+    """The smallest clearance of a phase, if it is smaller than that of those before it."""
+    robot = world.scene.robot.description
+    for sample in range(0, len(phase.q), _EVERY):
+        boxes = phase.boxes_at(sample)
+        fingers = robot.finger_values(phase.q[sample])
+        world.set(phase.q[sample, : len(robot.joint_names)], boxes, fingers)
+        for part, body in _pairs(world, phase, touched[sample], supports):
+            distance = world.distance(part, body, nearest.distance)
+            if distance < nearest.distance:
+                nearest = Clearance(distance, part, body, float(phase.times[sample]))
+    return nearest
+
+
+def _pairs(
+    world: World, phase: Phase, touched: set[tuple[str, str]], supports: set[tuple[str, str]]
+) -> Iterator[tuple[str, str]]:
+    """Moving parts, and bodies that they do not touch."""
+    scene, robot = world.scene, world.scene.robot.description
+    bodies = [body.name for body in scene.bodies]
+    for gripper, arm in robot.arms.items():
+        own = {box for box, (holder, _) in phase.grips.items() if holder == gripper}
+        handled = own | {box for box, holder in touched if holder == gripper}
+        yield from ((link, body) for link in arm.links for body in bodies)
+        yield from ((link, b) for link in arm.hand_links for b in bodies if b not in handled)
+    for box in phase.grips:
+        near = {body for pair in supports if box in pair for body in pair} | {*phase.grips}
+        yield from ((box, body) for body in bodies if body not in near)
