@@ -8,7 +8,7 @@ INSTALLED := $(VENV)/.installed
 export PATH := $(BIN):$(PATH)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: setup ship quick repro study cases test lint bench open-world mlflow verify-determinism verify-interruption verify-load verify-hostile sources reach
+.PHONY: setup ship quick repro study cases test lint bench open-world mlflow verify-determinism verify-interruption verify-load verify-hostile verify-execution sources reach
 
 setup: $(INSTALLED)
 
@@ -96,6 +96,10 @@ sources: setup
 # Spoilt input, kills, races, planted files, full disks, odd environments: half an hour.
 verify-hostile: setup
 	python tests/hostile.py
+
+# Plans under gravity: limits, friction, towers, closed loop: three quarters of an hour on two cores.
+verify-execution: setup
+	python benchmarks/execution.py
 
 mlflow: setup
 	guided-lgp mlflow ui

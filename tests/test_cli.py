@@ -23,7 +23,19 @@ from guided_lgp.scene.world import world_of
 ROOT = Path(__file__).parents[1]
 SCENE = ROOT / "examples" / "three_boxes.json"
 PLAN = ["plan", str(SCENE), "--goal", "(on red green)", "--planner", "breadth-first"]
-COMMANDS = [*cli.STAGES, "plan", "export", "pddl", "view", "schema", "examples", "doctor", "mlflow"]
+COMMANDS = [
+    *cli.STAGES,
+    "plan",
+    "execute",
+    "replan",
+    "export",
+    "pddl",
+    "view",
+    "schema",
+    "examples",
+    "doctor",
+    "mlflow",
+]
 
 
 def call(*arguments: str, cwd: Path = ROOT) -> subprocess.CompletedProcess[str]:
