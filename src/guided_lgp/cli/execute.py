@@ -42,9 +42,12 @@ def execute(
         typer.Option(
             metavar="M",
             help="Standard deviation along x and y by which arms misplace boxes, up to 0.05.",
+            show_default="0: none",
         ),
     ] = 0.0,
-    seed: Annotated[int, typer.Option(min=0, metavar="N", help="Of that noise.")] = 0,
+    seed: Annotated[
+        int, typer.Option(min=0, metavar="N", help="Of that noise.", show_default="0")
+    ] = 0,
     closed_loop: Annotated[
         bool,
         typer.Option(

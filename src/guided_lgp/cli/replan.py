@@ -24,7 +24,13 @@ def replan(
         ),
     ],
     after: Annotated[
-        int, typer.Option(min=0, metavar="N", help="How many actions have been carried out.")
+        int,
+        typer.Option(
+            min=0,
+            metavar="N",
+            help="How many actions have been carried out.",
+            show_default="0: none yet",
+        ),
     ] = 0,
     timeout: Annotated[
         float | None,
