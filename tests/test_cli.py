@@ -3,7 +3,6 @@
 import json
 import resource
 import runpy
-import shlex
 import signal
 import subprocess
 import sys
@@ -431,20 +430,6 @@ def test_the_python_interface_from_the_documentation() -> None:
         timeout=120,
     )
     assert done.stdout.startswith("(grasp")
-
-
-@pytest.mark.parametrize("command", [["schema", "params"], [*PLAN, "--html", "-"]])
-def test_a_closed_pipe_is_no_error(command: list[str]) -> None:
-    words = f"{sys.executable} -m guided_lgp.cli {shlex.join(command)} | head -c 20"
-    done = subprocess.run(
-        ["bash", "-o", "pipefail", "-c", words],
-        cwd=ROOT,
-        text=True,
-        capture_output=True,
-        check=True,
-    )
-    assert done.stderr == ""
-    assert len(done.stdout) == 20
 
 
 def test_the_version_and_short_help(capsys: pytest.CaptureFixture[str]) -> None:

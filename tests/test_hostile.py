@@ -136,6 +136,17 @@ def test_planted_links_show_where_they_are_followed(tmp_path: Path) -> None:
     assert planted.act_is_effective(tmp_path / "a", naive)
 
 
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can act as somebody else")
+def test_what_root_plants_for_another_shows_where_it_is_trusted() -> None:
+    def trusting(place: planted.Place) -> None:
+        ctypes.CDLL(str(next(place.cache.glob("seven-*.so"))))
+
+    for real in planted.REAL_USERS:
+        assert planted.is_effective_for_another(planted.roots_folder, trusting, real)
+        for plant, act in planted.BY_ROOT.items():
+            assert not planted.is_effective_for_another(plant, act, real)
+
+
 def test_nothing_planted_is_effective(tmp_path: Path) -> None:
     for plant in planted.PLANTS:
         assert not planted.is_effective(tmp_path / plant.__name__, plant)
@@ -187,7 +198,9 @@ def test_the_published_figures_hold(tmp_path: Path) -> None:
     assert figures["kills"]["in_stages"] >= 20
     assert figures["kills"]["damaged"] == 0
     assert (figures["races"]["torn"], figures["races"]["lost"]) == (0, 0)
-    assert figures["planted"]["tried"] == len((*planted.OF_OTHERS, *planted.PLANTS, *planted.ACTS))
+    own = len((*planted.OF_OTHERS, *planted.PLANTS, *planted.ACTS))
+    for_another = len(planted.BY_ROOT) * len(planted.REAL_USERS)
+    assert figures["planted"]["tried"] == own + for_another
     assert figures["planted"]["effective"] == 0
     assert figures["limits"]["tried"] >= 50
     assert (figures["limits"]["torn"], figures["limits"]["foreign"]) == (0, 0)

@@ -3,11 +3,14 @@
 import os
 from collections.abc import Callable
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
 
 from guided_lgp.cli.outputs import destinations
 from guided_lgp.errors import InputError
+
+SOMEBODY = 54322
 
 
 def refused(out: Path, html: Path | None = None, *inputs: Path) -> str:
@@ -41,6 +44,24 @@ def test_what_cannot_be_written(file: Callable[[Path], Path], fault: str, tmp_pa
     message = refused(file(tmp_path))
     assert message.startswith("--out ")
     assert fault in message
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can act as somebody else")
+@pytest.mark.parametrize(("mode", "refuses"), [(0o777, False), (0o1777, True), (0o755, True)])
+def test_whoever_acts_has_to_be_allowed_to(mode: int, refuses: bool) -> None:
+    """Others' files in a sticky folder, such as /tmp, cannot be replaced."""
+    with TemporaryDirectory() as folder:
+        Path(folder).chmod(mode)
+        file = Path(folder) / "plan.json"
+        file.touch()
+        os.seteuid(SOMEBODY)
+        try:
+            if refuses:
+                assert "Permission denied" in refused(file)
+            else:
+                assert destinations({"--out": file}, []) == {"--out": file.resolve()}
+        finally:
+            os.seteuid(0)
 
 
 def test_inputs_and_the_other_file_are_not_overwritten(tmp_path: Path) -> None:

@@ -126,11 +126,13 @@ def _content(file: Path) -> bytes | None:
         descriptor = os.open(file, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
     except OSError:
         return None
+    found = os.fstat(descriptor)
+    mine = stat.S_ISREG(found.st_mode) and found.st_uid == os.geteuid()
+    if not mine or found.st_mode & _OTHERS:
+        os.close(descriptor)
+        return None
     with os.fdopen(descriptor, "rb") as stream, suppress(OSError):
-        found = os.fstat(descriptor)
-        mine = stat.S_ISREG(found.st_mode) and found.st_uid == os.geteuid()
-        if mine and not found.st_mode & _OTHERS:
-            return stream.read()
+        return stream.read()
     return None
 
 

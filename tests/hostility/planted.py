@@ -7,11 +7,12 @@ import os
 import pickle
 import subprocess
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import chdir, suppress
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from unittest.mock import patch
 
 from guided_lgp import compiled
@@ -30,6 +31,8 @@ int guided_lgp_probe(void) { return 7; }
 """
 OTHER = 54322
 """Another user's id."""
+REAL_USERS = (OTHER, 0)
+"""The real user of a process that acts as the other one: itself, or root, who has started it."""
 _PRECIOUS = b"precious"
 
 
@@ -137,6 +140,15 @@ def pipe_for_a_library(place: Place) -> None:
     os.mkfifo(file)
 
 
+def folders_for_files(place: Place) -> None:
+    """Folders with something in them in place of library and digest."""
+    name = entry(place)
+    for file in (name, f"{name}.sha256"):
+        (place.cache / file).unlink()
+        (place.cache / file).mkdir()
+        (place.cache / file / "a").touch()
+
+
 def links_to_precious(place: Place) -> None:
     """Links in place of library, digest and lock, and where unfinished files might be."""
     name = entry(place)
@@ -164,6 +176,7 @@ PLANTS: tuple[Callable[[Place], None], ...] = (
     another_library,
     garbage,
     pipe_for_a_library,
+    folders_for_files,
     links_to_precious,
     hard_links_to_precious,
 )
@@ -198,9 +211,18 @@ def link_for_a_target(place: Place) -> None:
 
 def link_for_a_lock(place: Place) -> None:
     """A link where a stage's lock is to be."""
+    _lock(place).symlink_to(place.precious)
+    _hold(place)
+
+
+def _lock(place: Place) -> Path:
+    """Where a stage's lock is to be; its folder is there."""
     lock = place.folder / ".dvc" / "tmp" / "guided-lgp" / "stage.lock"
     lock.parent.mkdir(parents=True)
-    lock.symlink_to(place.precious)
+    return lock
+
+
+def _hold(place: Place) -> None:
     with alone(place.folder, "stage"):
         pass
 
@@ -256,6 +278,67 @@ ACTS: tuple[Callable[[Place], None], ...] = (
 """What the one who runs the program does beside something planted."""
 
 
+def roots_folder(place: Place) -> None:
+    """The cache is root's folder, to which all may write, with root's library and its digest."""
+    _evil_entry(place, 0, 0o644)
+    place.cache.chmod(0o777)
+
+
+def roots_library(place: Place) -> None:
+    """In one's own cache lies root's library with its digest."""
+    _evil_entry(place, 0, 0o644)
+    os.chown(place.cache, OTHER, -1)
+
+
+def roots_lock(place: Place) -> None:
+    """The lock of a stage is root's link to a file of one's own."""
+    lock = _lock(place)
+    lock.parent.chmod(0o777)
+    lock.symlink_to(place.precious)
+
+
+def roots_target(place: Place) -> None:
+    """What is to be written is root's link to a file of one's own, in a folder such as /tmp."""
+    (place.folder / "target").symlink_to(place.precious)
+    place.folder.chmod(0o1777)
+
+
+BY_ROOT: Mapping[Callable[[Place], None], Callable[[Place], object]] = {
+    roots_folder: lambda place: seven(),
+    roots_library: lambda place: seven(),
+    roots_lock: _hold,
+    roots_target: lambda place: write_text(place.folder / "target", "new"),
+}
+"""What root plants for another user, and what that one does."""
+
+
+def is_effective_for_another(
+    plant: Callable[[Place], None], act: Callable[[Place], object], real: int
+) -> bool:
+    """Whether root's plant is effective for another user.
+
+    Args:
+        plant: what root leaves.
+        act: what the other user does.
+        real: the real user of that process, such as a program has that acts as its owner.
+    """
+    with TemporaryDirectory() as folder:  # where another user can get to
+        place = _prepared(Path(folder))
+        os.chown(place.precious, OTHER, -1)
+
+        def as_another() -> None:
+            os.setgroups([])
+            os.setresgid(OTHER, OTHER, OTHER)
+            os.setresuid(real, OTHER, OTHER)
+            act(place)
+
+        with patch.dict(os.environ, XDG_CACHE_HOME=str(place.cache.parent)):
+            _in_child(seven)
+            plant(place)
+            ended_well = _in_child(as_another)
+        return _has_effect(place) or not ended_well
+
+
 def is_effective(
     folder: Path, plant: Callable[[Place], None], act: Callable[[], None] = seven
 ) -> bool:
@@ -308,6 +391,11 @@ def _in_child(work: Callable[[], None]) -> bool:
 
 def all_plants(folder: Path) -> dict[str, bool]:
     """Whether each of them is effective."""
-    plants = (*OF_OTHERS, *PLANTS) if os.geteuid() == 0 else PLANTS
+    root = os.geteuid() == 0
+    plants = (*OF_OTHERS, *PLANTS) if root else PLANTS
     found = {plant.__name__: is_effective(folder / plant.__name__, plant) for plant in plants}
+    for plant, act in BY_ROOT.items() if root else ():
+        for real in REAL_USERS:
+            name = f"{plant.__name__}, real user {real}"
+            found[name] = is_effective_for_another(plant, act, real)
     return found | {act.__name__: act_is_effective(folder / act.__name__, act) for act in ACTS}

@@ -1,6 +1,7 @@
 """Files that a command is to write: refused before the work begins, not after it."""
 
 import os
+import stat
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -42,9 +43,21 @@ def _destination(where: str, file: Path) -> Path:
         raise InputError(where, "is a folder, or no name at all", "a file")
     if not target.parent.is_dir():
         raise InputError(where, "its folder does not exist", "a file in an existing folder")
-    if not os.access(target if is_stream(target) else target.parent, os.W_OK):
+    if not _can_be_written(target):
         raise InputError(where, "cannot be written: Permission denied")
     return target
+
+
+def _can_be_written(target: Path) -> bool:
+    """Whether this process, as who it acts, may fill a stream, or replace a file in its folder."""
+    place = target if is_stream(target) else target.parent
+    effective = os.access in os.supports_effective_ids
+    if not os.access(place, os.W_OK, effective_ids=effective):
+        return False
+    if place == target or not target.exists() or not place.stat().st_mode & stat.S_ISVTX:
+        return True
+    # In a sticky folder, such as /tmp, files are replaced by their owner, the folder's, or root.
+    return os.geteuid() in (0, target.stat().st_uid, place.stat().st_uid)
 
 
 def _followed(where: str, file: Path) -> Path:

@@ -10,6 +10,7 @@ import typer
 
 from guided_lgp import __version__
 from guided_lgp.cli.outputs import destinations
+from guided_lgp.cli.running import complain
 from guided_lgp.cli.terminal import AsJson, is_plan, one_of, seconds, show, spinner
 from guided_lgp.documents import STANDARD_OUTPUT
 from guided_lgp.domains import domain_names
@@ -276,13 +277,13 @@ def plan(
 def _say_why_not(result: "PlanningResult", summary: Mapping[str, object], as_json: bool) -> None:
     if as_json:
         typer.echo(json.dumps(summary, indent=1))
-    typer.echo(f"no plan: {result.explanation}", err=True)
+    complain(f"no plan: {result.explanation}")
     for obstacle in result.obstacles[1:3]:
-        typer.echo(f"also infeasible: {obstacle}", err=True)
+        complain(f"also infeasible: {obstacle}")
     hints = [result.finding.help] if result.finding is not None else []
     for hint in (*hints, _HINTS.get(result.reason)):
         if hint:
-            typer.echo(f"hint: {hint}", err=True)
+            complain(f"hint: {hint}")
 
 
 def _origin(path: Path, shipped: Path) -> str:

@@ -1,11 +1,13 @@
 """Running a program: errors become one line and an exit code."""
 
+import errno
 import logging
 import os
+import select
 import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import NoReturn
 
 import typer
@@ -21,6 +23,7 @@ def run_program(program: Callable[[list[str]], int | None], arguments: Sequence[
         program: is given the words of the command line; what it returns is the exit code.
         arguments: these words, and anywhere among them ``--debug`` for the traceback of an error.
     """
+    _open_streams()
     debug = "--debug" in arguments
     logging.basicConfig(format="%(message)s", level=logging.WARNING)
     logging.getLogger("guided_lgp").setLevel(logging.DEBUG if debug else logging.INFO)
@@ -33,15 +36,52 @@ def run_program(program: Callable[[list[str]], int | None], arguments: Sequence[
         _fail(_missing(error), 2, debug)
     except KeyboardInterrupt:
         sys.exit(130)
-    except BrokenPipeError:
-        # Who reads has seen enough; what is still buffered goes nowhere, without another error.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(0)
+    except (BrokenPipeError, SystemExit) as error:
+        if _has_been_read_enough(error):
+            # What is still buffered goes nowhere, without another error.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+            sys.exit(0)
+        if isinstance(error, SystemExit):
+            raise
+        _fail(error, 3, debug)
     except MemoryError as error:
         _fail(error if debug else WorkerError("out of memory"), 3, debug)
+    except OSError as error:
+        full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+        fault = InputError(error.filename or "output", f"cannot be written: {error.strerror}")
+        _fail(fault if full else error, 2 if full else 3, debug)
     except Exception as error:
         _fail(error, 3, debug)
     sys.exit(code)
+
+
+def _open_streams() -> None:
+    """Open what the caller has closed of the three streams, on nothing.
+
+    Else the next file that is opened would be one of them, and get what is written there.
+    """
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        if getattr(sys, name) is None:
+            nothing = os.open(os.devnull, os.O_RDWR)
+            if nothing != number:
+                os.dup2(nothing, number)
+                os.close(nothing)
+            setattr(sys, name, os.fdopen(number, "w" if number else "r"))
+
+
+def _has_been_read_enough(error: BaseException) -> bool:
+    """Whether this comes of a reader of standard output who has gone; Typer ends with 1 then."""
+    if not any(isinstance(one, BrokenPipeError) for one in (error, error.__context__)):
+        return False
+    output = select.poll()
+    output.register(1, 0)
+    return any(event & (select.POLLERR | select.POLLHUP) for _, event in output.poll(0))
+
+
+def complain(line: str) -> None:
+    """Write a line to standard error, if anybody reads it: the exit code says the same."""
+    with suppress(BrokenPipeError):
+        typer.echo(line, err=True)
 
 
 @contextmanager
@@ -94,5 +134,5 @@ def _fail(error: Exception, code: int, debug: bool) -> NoReturn:
     text = error.format_message() if isinstance(error, TyperException) else str(error)
     if code == 3 and not isinstance(error, WorkerError):
         text = f"internal error: {type(error).__name__}: {text}; --debug shows where"
-    typer.echo(shortened(f"error: {printable(' '.join(text.split()))}"), err=True)
+    complain(shortened(f"error: {printable(' '.join(text.split()))}"))
     sys.exit(code)
