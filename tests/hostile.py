@@ -13,7 +13,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -30,9 +29,10 @@ from guided_lgp.experiments import (
 from guided_lgp.params import load_params
 from hostility import environments, kills, limits, planted, races
 from hostility.commands import Commands
+from hostility.examples import ROOT, Examples
 from hostility.judge import Verdicts, judge
 from hostility.kills import contents, kill_a_stage
-from hostility.loaders import ROOT, Examples, loaders
+from hostility.loaders import loaders
 from hostility.writers import PARAMS, writers
 
 SEED = 20
@@ -88,7 +88,7 @@ def killed(folder: Path) -> Part:
         writer.kill_everywhere(folder / writer.name.replace(" ", "-"), figures)
         print(f"{writer.name}: {figures.inside_window - before} kills", flush=True)
     kill_stages(folder, figures)
-    return _counts(figures), figures.faults
+    return figures.counts(), figures.faults
 
 
 def kill_stages(folder: Path, figures: kills.Figures) -> None:
@@ -110,14 +110,14 @@ def kill_stages(folder: Path, figures: kills.Figures) -> None:
     expected, found = map(contents, roots)
     for name in expected.keys() | found.keys():
         if expected.get(name) != found.get(name) and ".shards" not in name:
-            figures.damage(f"{name} is another after kills")
+            figures.fault("damaged", f"{name} is another after kills")
 
 
 def raced(folder: Path) -> Part:
     """Processes at once."""
     figures = races.Figures()
     races.all_races(folder, figures)
-    return _counts(figures), figures.faults
+    return figures.counts(), figures.faults
 
 
 def plants(folder: Path) -> Part:
@@ -133,14 +133,14 @@ def limited(folder: Path) -> Part:
     figures = limits.Figures()
     limits.write_on_full_disks(writers(Examples(folder / "examples")), folder / "disks", figures)
     limits.plan_with_little_memory(folder / "memory", figures)
-    return _counts(figures), figures.faults
+    return figures.counts(), figures.faults
 
 
 def elsewhere(folder: Path) -> Part:
     """Other environments."""
     figures = environments.Figures()
     environments.all_environments(folder, cache.cache_folder(), figures)
-    return _counts(figures), figures.faults
+    return figures.counts(), figures.faults
 
 
 def checks_at_the_start(folder: Path) -> Part:
@@ -188,10 +188,6 @@ def startup_ms() -> float:
     command = [sys.executable, "-c", _PLAN]
     runs = [subprocess.run(command, cwd=ROOT, capture_output=True, check=True) for _ in range(6)]
     return statistics.median(float(run.stdout) for run in runs[1:])  # the first may fill the cache
-
-
-def _counts(figures: Any) -> dict[str, int]:
-    return {name: value for name, value in asdict(figures).items() if name != "faults"}
 
 
 def main() -> int:

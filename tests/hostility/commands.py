@@ -16,7 +16,7 @@ import numpy as np
 
 from guided_lgp import cli, tracking
 from guided_lgp.errors import LONGEST, InputError
-from hostility.loaders import ROOT, Examples
+from hostility.examples import ROOT, Examples
 from hostility.spoiling import NAMES, ODD, Rng, pick
 
 _PLAN = ("plan", "three_boxes.json", "--goal", "(on red green)")

@@ -10,8 +10,9 @@ from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
 
+from hostility.examples import ROOT
+from hostility.figures import Counted
 from hostility.kills import contents
-from hostility.loaders import ROOT
 
 LIMIT_S = 1200
 WORK = """
@@ -65,12 +66,11 @@ ENVIRONMENTS = (
 
 
 @dataclass
-class Figures:
+class Figures(Counted):
     """Environments that were tried, and those whose bytes were others."""
 
     tried: int = 0
     different: int = 0
-    faults: list[str] = field(default_factory=list)
 
 
 def digests(environment: Environment, folder: Path, cache: Path) -> dict[str, str]:
@@ -121,8 +121,7 @@ def compare(
     names = sorted(ordinary.keys() | found.keys())
     other = [file for file in names if ordinary.get(file) != found.get(file)]
     if other:
-        figures.different += 1
-        figures.faults.append(f"{name}: {other} {json.dumps(found.get('error'))}")
+        figures.fault("different", f"{name}: {other} {json.dumps(found.get('error'))}")
 
 
 def all_environments(folder: Path, cache: Path, figures: Figures) -> None:

@@ -15,6 +15,7 @@ from typing import Any
 from unittest.mock import patch
 
 from guided_lgp import documents
+from hostility.figures import Counted
 
 MOMENTS = ("opened", "half", "written", "synced")
 """When an unfinished file is there and empty; half written; written and not synced; synced and
@@ -119,18 +120,12 @@ def killed(work: Callable[[], object], target: int) -> Kill:
 
 
 @dataclass
-class Figures:
+class Figures(Counted):
     """How many kills were inside a window, and after how many something was damaged."""
 
     inside_window: int = 0
     in_stages: int = 0
     damaged: int = 0
-    faults: list[str] = field(default_factory=list)
-
-    def damage(self, what: str) -> None:
-        """Count one, and say what."""
-        self.damaged += 1
-        self.faults.append(what)
 
 
 @dataclass(frozen=True)
@@ -174,14 +169,14 @@ class Writer:
         found, where = contents(place), f"{self.name}, {kill.moment}"
         torn = {name for name in found if found[name] not in (expected.get(name), before.get(name))}
         if torn or before.keys() - found.keys():
-            figures.damage(f"{where}: torn {torn}, lost {before.keys() - found.keys()}")
+            figures.fault("damaged", f"{where}: torn {torn}, lost {before.keys() - found.keys()}")
         with patch.object(documents, "_LEFTOVER_S", -1.0):
             self.work(place, 1)
         if contents(place) != before | expected:
-            figures.damage(f"{where}: does not go on to the same bytes")
+            figures.fault("damaged", f"{where}: does not go on to the same bytes")
         left = [entry.name for entry in place.rglob(f"{_UNFINISHED}*")]
         if left:
-            figures.damage(f"{where}: leaves {left}")
+            figures.fault("damaged", f"{where}: leaves {left}")
 
 
 _MOST = 200

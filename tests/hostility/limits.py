@@ -9,12 +9,13 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 from guided_lgp.errors import LONGEST, InputError
+from hostility.examples import ROOT
+from hostility.figures import Counted
 from hostility.kills import Writer, contents
-from hostility.loaders import ROOT
 
 DISK = 512 * 1024
 """Bytes of the small disk."""
@@ -25,13 +26,12 @@ SCENE = ROOT / "examples" / "three_boxes.json"
 
 
 @dataclass
-class Figures:
+class Figures(Counted):
     """Attempts under a limit, those that tore a file, and those that ended in other words."""
 
     tried: int = 0
     torn: int = 0
     foreign: int = 0
-    faults: list[str] = field(default_factory=list)
 
 
 @contextmanager
@@ -86,11 +86,10 @@ def _write_on_a_full_disk(writer: Writer, place: Path, left: int, figures: Figur
     missing = before.keys() - after.keys()
     changed = [name for name in before.keys() & after.keys() if before[name] != after[name]]
     if missing or (changed and outcome != "done" and len(before) == 1):
-        figures.torn += 1
-        figures.faults.append(f"{writer.name}, {left} B left: lost {missing}, changed {changed}")
+        what = f"{writer.name}, {left} B left: lost {missing}, changed {changed}"
+        figures.fault("torn", what)
     if outcome not in ("done", "refused"):
-        figures.foreign += 1
-        figures.faults.append(f"{writer.name}, {left} B left: {outcome}")
+        figures.fault("foreign", f"{writer.name}, {left} B left: {outcome}")
 
 
 def in_child(work: Callable[[], object]) -> str:
@@ -146,11 +145,10 @@ def plan_with_little_memory(folder: Path, figures: Figures) -> None:
         figures.tried += 1
         found = out.read_text()
         if found != "{}" and not found.endswith("}\n"):
-            figures.torn += 1
-            figures.faults.append(f"{megabytes} MB: half a plan")
+            figures.fault("torn", f"{megabytes} MB: half a plan")
         lines = done.stderr.splitlines()
         if done.returncode != 0 and (
             done.returncode < 0 or len(lines) != 1 or len(lines[0]) > LONGEST + len("error: ")
         ):
-            figures.foreign += 1
-            figures.faults.append(f"{megabytes} MB: {done.returncode}: {done.stderr[-500:]}")
+            what = f"{megabytes} MB: {done.returncode}: {done.stderr[-500:]}"
+            figures.fault("foreign", what)

@@ -1,81 +1,57 @@
 """Every reader of a file, with good files to spoil."""
 
 import json
-import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
-import yaml
-from outputs import write_outputs
-from own_robot import describe, document, written
 
-from guided_lgp.bounds.plan_file import read_plan, write_plan
+from guided_lgp.bounds.plan_file import read_plan
 from guided_lgp.cases import collect
-from guided_lgp.cases.outcomes import outcomes_of, times_of
-from guided_lgp.cases.policies import RIVALS, demonstrations_of
+from guided_lgp.cases.outcomes import outcomes_of
+from guided_lgp.cases.policies import demonstrations_of
 from guided_lgp.cases.replay import longest_plan
-from guided_lgp.cases.shards import read_kept, write_kept
+from guided_lgp.cases.shards import read_kept
 from guided_lgp.cases.train import load_demonstrations, shuffled
-from guided_lgp.documents import read_json, read_yaml, write_json
+from guided_lgp.documents import read_json, read_yaml
 from guided_lgp.domains import load_domain
 from guided_lgp.logic import (
-    format_objective,
     parse_objective,
     parse_skeleton,
     two_goal_objectives,
 )
 from guided_lgp.logic.objectives import check_objective
-from guided_lgp.params import Params, load_params, load_planning, read_params
+from guided_lgp.params import Params, load_planning, read_params
 from guided_lgp.paths import (
     EVALUATION,
-    EXAMPLES,
     METRICS,
-    MODELS,
     REPORTS,
     SCENES,
     SEQUENCES,
     TRAINING,
 )
-from guided_lgp.planning import plan
-from guided_lgp.policy.paper.dataset import Dataset, load_dataset
-from guided_lgp.policy.paper.samples import build_dataset
+from guided_lgp.policy.paper.dataset import load_dataset
 from guided_lgp.policy.registry import load_policy
-from guided_lgp.policy.tensors import read_tensors, write_tensors
 from guided_lgp.report import analysis, tables
 from guided_lgp.report.inputs import load_inputs
 from guided_lgp.report.scalability_tables import scalability
 from guided_lgp.report.summary import summary
 from guided_lgp.robots.build import read_robot
-from guided_lgp.scene import Scene, generate, load_scene, load_scenes
+from guided_lgp.scene import load_scene, load_scenes
 from guided_lgp.scene.goals import complete_objective
 from guided_lgp.scene.validate import validate_scene
-from guided_lgp.sequences import SHORTEST, VERDICTS, feasible_sequences, read_shortest
-from guided_lgp.studies.cases import load_study
-from guided_lgp.tables import write_table
+from guided_lgp.sequences import feasible_sequences, read_shortest
+from guided_lgp.studies.cases import RESULTS, load_study
+from guided_lgp.studies.feasibility_tables import feasibility_tables
+from guided_lgp.studies.tables import read_figures
 from guided_lgp.tracking.metrics import read_metrics
 from guided_lgp.tracking.stage_files import read_lock
 from hostility import spoiling
+from hostility.examples import CASE, GOALS, PARAMS, ROOT, STUDY, Examples, built
 from hostility.spoiling import Spoiler
-
-ROOT = Path(__file__).parents[2]
-PARAMS = load_params(ROOT / "params.yaml")
-CASE = "rows"
-GOALS = (
-    "(on red green)",
-    "(held blue)",
-    "(held blue pr2L)",
-    "(empty pr2R)",
-    "(handempty)",
-    "(at red 0.5 0.3 0.65 0.2 0.01 0.05)",
-    "(at red tab1 0.5 0.3 0.65 0.2)",
-    "(in red tab1 -0.1 -0.1 0.1 0.1)",
-    "(upright red)",
-)
 
 
 @dataclass(frozen=True)
@@ -116,127 +92,6 @@ def spoiler(file: Path) -> Spoiler:
         ".obj": spoiling.text,
     }
     return kinds[file.suffix]
-
-
-class Examples:
-    """Good files of every kind, made in a folder when they are needed."""
-
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-
-    def _new(self, name: str) -> Path:
-        folder = self._folder / name
-        folder.mkdir(parents=True)
-        return folder
-
-    @cached_property
-    def scenes(self) -> Path:
-        """The example scenes, and a plan."""
-        folder = self._new("scenes")
-        for file in EXAMPLES.glob("*.json"):
-            shutil.copy(file, folder)
-        start = load_scene(folder / "three_boxes.json")
-        found = plan(start, ["(on red green)"])
-        assert found.path is not None
-        objective = parse_objective(["(on red green)"])
-        write_plan(folder / "plan.json", start, objective, found.path, {"planner": "guided"})
-        _write_whole_scene(folder)
-        for number, goal in enumerate(GOALS):
-            (folder / f"goal{number}.txt").write_text(goal)
-        return folder
-
-    @cached_property
-    def parameters(self) -> Path:
-        """The parameters of the pipeline, of planning and of the studies."""
-        folder = self._new("parameters")
-        (folder / "studies").mkdir()
-        for name in ("params.yaml", "studies/params.yaml", "dvc.lock"):
-            shutil.copy(ROOT / name, folder / name)
-        params = yaml.safe_load((folder / "params.yaml").read_text())
-        planning = {name: params[name] for name in ("bounds", "compare_scalability")}
-        (folder / "planning.yaml").write_text(yaml.safe_dump(planning))
-        return folder
-
-    @cached_property
-    def robot(self) -> Path:
-        """A small robot with its description."""
-        folder = self._new("robot")
-        describe(folder, "left_", "right_")
-        written(folder, document("left_", "right_"))
-        return folder
-
-    @cached_property
-    def models(self) -> Path:
-        """The shipped weights."""
-        return Path(shutil.copytree(MODELS, self._folder / "models"))
-
-    @cached_property
-    def outputs(self) -> Path:
-        """What all stages write, with made-up figures; and a data set."""
-        folder = self._new("outputs")
-        write_outputs(folder)
-        return folder
-
-    @cached_property
-    def case(self) -> Path:
-        """A case: some demonstrations, the rows of two problems, and a result that is kept."""
-        folder = self._new("case")
-        arrays = read_tensors(demonstrations_of(ROOT, CASE), "make cases")
-        few = {name: array[::50] for name, array in arrays.items()}
-        write_tensors(demonstrations_of(folder, CASE), few)
-        for training in (RIVALS, *map(str, PARAMS.cases[CASE].seeds)):
-            for file in (outcomes_of, times_of):
-                rows = read_json(file(ROOT, CASE, training))
-                first = dict.fromkeys(row["scene"] for row in rows)
-                two = [row for row in rows if row["scene"] in list(first)[:2]]
-                write_json(file(folder, CASE, training), two)
-        write_kept(folder / "kept.json", [{"numbers": [1, 2.5, None], "name": "red"}])
-        return folder
-
-    @cached_property
-    def sequences(self) -> Path:
-        """Scenes, the tables of their enumeration as if one action were feasible, a data set."""
-        folder = self._new("sequences")
-        generate("a", 2, 1, "scene").save(folder / "scenes.json")
-        scenes = load_scenes(folder / "scenes.json").scenes
-        grasps = [(s, box.name) for s in scenes for box in s.boxes]
-        verdicts = [_verdict(scene, box) for scene, box in grasps]
-        shortest = [
-            {"configuration": scene.name, "objective": format_objective(pair), "length": 1}
-            for scene in scenes
-            for pair in two_goal_objectives(scene.symbols)
-        ]
-        write_table(folder / "verdicts.parquet", pa.Table.from_pylist(verdicts, schema=VERDICTS))
-        write_table(folder / "shortest.parquet", pa.Table.from_pylist(shortest, schema=SHORTEST))
-        _built(folder).save(folder / "dataset")
-        return folder
-
-
-def _write_whole_scene(folder: Path) -> None:
-    """A scene with every field that there is, and the file of a mesh."""
-    scene = json.loads((folder / "kitchen.json").read_text())
-    scene |= {"domain": "pick_and_place"}
-    scene["robot"] |= {"height": 0.0, "tilt": [0.0, 0.0], "joints": {"r_shoulder_pan_joint": -1.0}}
-    tile = {"name": "tile", "size": [0.02, 0.06, 0.1], "position": [0.62, 0.22, 0.61]}
-    turned = [0.0, 0.7071068, 0.0, 0.7071068]
-    scene["boxes"].append(tile | {"quaternion": turned, "on": "counter", "colour": "#aa0000"})
-    wedge = next(box for box in scene["boxes"] if box["name"] == "wedge")
-    corners = wedge.pop("vertices")
-    lines = [f"v {x} {y} {z}" for x, y, z in corners] + ["f 1 2 3", "f 5 6 7"]
-    (folder / "wedge.obj").write_text("\n".join(lines) + "\n")
-    wedge["mesh"] = "wedge.obj"
-    (folder / "whole.json").write_text(json.dumps(scene))
-
-
-def _verdict(scene: Scene, box: str) -> dict[str, object]:
-    return {
-        "configuration": scene.name,
-        "skeleton": f"(grasp pr2L {box})",
-        "length": 1,
-        "feasible": box != "blue",
-        "failure_constraint": "reach" if box == "blue" else None,
-        "states": [0.1 * step for step in range(42)] if box != "blue" else None,
-    }
 
 
 def loaders(folder: Path) -> tuple[Loader, ...]:
@@ -312,7 +167,7 @@ def _stage_files(examples: Examples) -> Iterator[Loader]:
     folder = examples.sequences
     tables = ("verdicts.parquet", "shortest.parquet")
     yield Loader("sequences", folder, tables, _sequences)
-    yield Loader("samples of sequences", folder, tables, _built, 0.5)
+    yield Loader("samples of sequences", folder, tables, built, 0.5)
     files = ("dataset/dataset.json", "dataset/samples.safetensors")
     yield Loader("data set", folder, files, lambda f: load_dataset(f / "dataset"))
     yield Loader("data set, digest right", folder, files[1:], _with_its_digest)
@@ -327,6 +182,8 @@ def _stage_files(examples: Examples) -> Iterator[Loader]:
         )
     )
     yield Loader("report", folder, files, _report, 0.2)
+    studies = tuple(str(RESULTS / f"{name}.json") for name in STUDY)
+    yield Loader("tables of studies", examples.studies, studies, _study_tables, 0.5)
     lock = ("dvc.lock",)
     yield Loader("dvc.lock", examples.parameters, lock, lambda f: read_lock(f / "dvc.lock"), 0.1)
 
@@ -357,18 +214,17 @@ def _collected(folder: Path) -> object:
     return json.dumps([*figures, collect.compared(rows)], allow_nan=False)
 
 
+def _study_tables(folder: Path) -> object:
+    study, _ = load_study(ROOT)
+    names = [(name, content) for name, content in study.tables.items() if name in STUDY]
+    return [read_figures(folder, *one) for one in names], feasibility_tables(folder)
+
+
 def _sequences(folder: Path) -> object:
     scenes = load_scenes(folder / "scenes.json").scenes
     objectives = two_goal_objectives(scenes[0].symbols)[:5]
     read_shortest(folder / "shortest.parquet", scenes, objectives)
     return feasible_sequences(folder / "verdicts.parquet", scenes)
-
-
-def _built(folder: Path) -> Dataset:
-    scenes = load_scenes(folder / "scenes.json").scenes
-    objectives = two_goal_objectives(scenes[0].symbols)[:5]
-    verdicts, shortest = folder / "verdicts.parquet", folder / "shortest.parquet"
-    return build_dataset(scenes, verdicts, shortest, objectives, 0)
 
 
 def _with_its_digest(folder: Path) -> object:

@@ -145,8 +145,7 @@ def folders_for_files(place: Place) -> None:
     name = entry(place)
     for file in (name, f"{name}.sha256"):
         (place.cache / file).unlink()
-        (place.cache / file).mkdir()
-        (place.cache / file / "a").touch()
+        (place.cache / file / "a").mkdir(parents=True)
 
 
 def links_to_precious(place: Place) -> None:

@@ -8,15 +8,16 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from multiprocessing.synchronize import Event
 from pathlib import Path
 
 from guided_lgp import tracking
 from guided_lgp.documents import write_text
 from guided_lgp.tracking.database import search
+from hostility.examples import ROOT
+from hostility.figures import Counted
 from hostility.kills import contents
-from hostility.loaders import ROOT
 from load import PIPELINE
 
 LIMIT_S = 600
@@ -26,18 +27,12 @@ _SIZE = 5000
 
 
 @dataclass
-class Figures:
+class Figures(Counted):
     """Processes that ran at once, reads that were torn, results that were lost."""
 
     runs: int = 0
     torn: int = 0
     lost: int = 0
-    faults: list[str] = field(default_factory=list)
-
-    def lose(self, fault: str) -> None:
-        """Count a result that is not there, and say which."""
-        self.lost += 1
-        self.faults.append(fault)
 
 
 Write = Callable[[Path, str], object]
@@ -75,7 +70,7 @@ def write_at_once(
     figures.runs += writers
     figures.torn += torn.value
     if file.read_text()[:1] not in "abcd"[:writers] or any(p.exitcode for p in at_work):
-        figures.lose("writers of one file: none of the contents stayed")
+        figures.fault("lost", "writers of one file: none of the contents stayed")
 
 
 def together(
@@ -107,7 +102,7 @@ def plan_at_once(folder: Path, figures: Figures) -> None:
     for code, said in together([[*PROGRAM, *words]] * 4, folder, XDG_CACHE_HOME=str(folder / "c")):
         figures.runs += 1
         if code != 0:
-            figures.lose(f"plan ended with {code}: {said}")
+            figures.fault("lost", f"plan ended with {code}: {said}")
     json.loads(out.read_text())
 
 
@@ -123,7 +118,7 @@ def compile_at_once(folder: Path, figures: Figures) -> None:
     for code, said in together([command] * 4, folder, XDG_CACHE_HOME=str(folder)):
         figures.runs += 1
         if code != 0:
-            figures.lose(f"a library was not there: {said}")
+            figures.fault("lost", f"a library was not there: {said}")
 
 
 def run_stage_at_once(folder: Path, figures: Figures, processes: int) -> None:
@@ -138,11 +133,11 @@ def run_stage_at_once(folder: Path, figures: Figures, processes: int) -> None:
     for code, said in together([command] * processes, roots[1], **variables):
         figures.runs += 1
         if code not in (0, 2) or (code == 2 and "runs already in this clone: process" not in said):
-            figures.lose(f"a stage ended with {code}: {said}")
+            figures.fault("lost", f"a stage ended with {code}: {said}")
     alone, both = (contents(root / "data") for root in roots)
     figures.torn += sum(both[name] != alone[name] for name in both.keys() & alone.keys())
     for name in alone.keys() - both.keys():
-        figures.lose(f"{name} is not there")
+        figures.fault("lost", f"{name} is not there")
 
 
 _RECORD = """
@@ -170,7 +165,9 @@ def record_at_once(folder: Path, figures: Figures, processes: int = 4) -> None:
     found = list(search(tracking.prepare(), f"tags.`{tracking.STAGE_TAG}` != ''"))
     finished = sum(run.info.status == "FINISHED" for run in found)
     for _ in range(processes - finished):
-        figures.lose(f"{finished} of {processes} stages recorded: {[line for _, line in said]}")
+        figures.fault(
+            "lost", f"{finished} of {processes} stages recorded: {[line for _, line in said]}"
+        )
 
 
 def all_races(folder: Path, figures: Figures) -> None:

@@ -20,8 +20,8 @@ from guided_lgp.report.drawing import save
 from guided_lgp.scene import generate
 from guided_lgp.tables import write_table
 from guided_lgp.view.replay import replay_html
+from hostility.examples import ROOT, Examples
 from hostility.kills import Writer
-from hostility.loaders import ROOT, Examples
 from stand_ins import NothingOnBlue
 
 PARAMS = ROOT / "tests" / "params.yaml"

@@ -1,0 +1,192 @@
+"""Good files of every kind, to spoil."""
+
+import json
+import shutil
+from functools import cached_property
+from pathlib import Path
+
+import pyarrow as pa
+import yaml
+from outputs import write_outputs
+from own_robot import describe, document, written
+
+from guided_lgp.bounds.plan_file import write_plan
+from guided_lgp.cases.outcomes import outcomes_of, times_of
+from guided_lgp.cases.policies import RIVALS, demonstrations_of
+from guided_lgp.cases.shards import write_kept
+from guided_lgp.documents import read_json, write_json
+from guided_lgp.logic import (
+    format_objective,
+    parse_objective,
+    two_goal_objectives,
+)
+from guided_lgp.params import load_params
+from guided_lgp.paths import (
+    EXAMPLES,
+    MODELS,
+)
+from guided_lgp.planning import plan
+from guided_lgp.policy.paper.dataset import Dataset
+from guided_lgp.policy.paper.samples import build_dataset
+from guided_lgp.policy.tensors import read_tensors, write_tensors
+from guided_lgp.scene import Scene, generate, load_scene, load_scenes
+from guided_lgp.sequences import SHORTEST, VERDICTS
+from guided_lgp.studies.cases import RESULTS
+from guided_lgp.tables import write_table
+
+ROOT = Path(__file__).parents[2]
+PARAMS = load_params(ROOT / "params.yaml")
+CASE = "rows"
+STUDY = ("spread", "feasibility", "feasibility_timing")
+"""Files of the studies."""
+GOALS = (
+    "(on red green)",
+    "(held blue)",
+    "(held blue pr2L)",
+    "(empty pr2R)",
+    "(handempty)",
+    "(at red 0.5 0.3 0.65 0.2 0.01 0.05)",
+    "(at red tab1 0.5 0.3 0.65 0.2)",
+    "(in red tab1 -0.1 -0.1 0.1 0.1)",
+    "(upright red)",
+    "(posture pr2R 0.1 0.2 -1.5 -1.2 0 -0.5 0)",
+)
+
+
+class Examples:
+    """Good files of every kind, made in a folder when they are needed."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def _new(self, name: str) -> Path:
+        folder = self._folder / name
+        folder.mkdir(parents=True)
+        return folder
+
+    @cached_property
+    def scenes(self) -> Path:
+        """The example scenes, and a plan."""
+        folder = self._new("scenes")
+        for file in EXAMPLES.glob("*.json"):
+            shutil.copy(file, folder)
+        start = load_scene(folder / "three_boxes.json")
+        found = plan(start, ["(on red green)"])
+        assert found.path is not None
+        objective = parse_objective(["(on red green)"])
+        write_plan(folder / "plan.json", start, objective, found.path, {"planner": "guided"})
+        _write_whole_scene(folder)
+        for number, goal in enumerate(GOALS):
+            (folder / f"goal{number}.txt").write_text(goal)
+        return folder
+
+    @cached_property
+    def parameters(self) -> Path:
+        """The parameters of the pipeline, of planning and of the studies."""
+        folder = self._new("parameters")
+        (folder / "studies").mkdir()
+        for name in ("params.yaml", "studies/params.yaml", "dvc.lock"):
+            shutil.copy(ROOT / name, folder / name)
+        params = yaml.safe_load((folder / "params.yaml").read_text())
+        planning = {name: params[name] for name in ("bounds", "compare_scalability")}
+        (folder / "planning.yaml").write_text(yaml.safe_dump(planning))
+        return folder
+
+    @cached_property
+    def robot(self) -> Path:
+        """A small robot with its description."""
+        folder = self._new("robot")
+        describe(folder, "left_", "right_")
+        written(folder, document("left_", "right_"))
+        return folder
+
+    @cached_property
+    def models(self) -> Path:
+        """The shipped weights."""
+        return Path(shutil.copytree(MODELS, self._folder / "models"))
+
+    @cached_property
+    def outputs(self) -> Path:
+        """What all stages write, with made-up figures; and a data set."""
+        folder = self._new("outputs")
+        write_outputs(folder)
+        return folder
+
+    @cached_property
+    def studies(self) -> Path:
+        """What some of the studies have written."""
+        folder = self._new("studies")
+        (folder / RESULTS).mkdir(parents=True)
+        for name in STUDY:
+            shutil.copy(ROOT / RESULTS / f"{name}.json", folder / RESULTS)
+        return folder
+
+    @cached_property
+    def case(self) -> Path:
+        """A case: some demonstrations, the rows of two problems, and a result that is kept."""
+        folder = self._new("case")
+        arrays = read_tensors(demonstrations_of(ROOT, CASE), "make cases")
+        few = {name: array[::50] for name, array in arrays.items()}
+        write_tensors(demonstrations_of(folder, CASE), few)
+        for training in (RIVALS, *map(str, PARAMS.cases[CASE].seeds)):
+            for file in (outcomes_of, times_of):
+                rows = read_json(file(ROOT, CASE, training))
+                first = dict.fromkeys(row["scene"] for row in rows)
+                two = [row for row in rows if row["scene"] in list(first)[:2]]
+                write_json(file(folder, CASE, training), two)
+        write_kept(folder / "kept.json", [{"numbers": [1, 2.5, None], "name": "red"}])
+        return folder
+
+    @cached_property
+    def sequences(self) -> Path:
+        """Scenes, the tables of their enumeration as if one action were feasible, a data set."""
+        folder = self._new("sequences")
+        generate("a", 2, 1, "scene").save(folder / "scenes.json")
+        scenes = load_scenes(folder / "scenes.json").scenes
+        grasps = [(s, box.name) for s in scenes for box in s.boxes]
+        verdicts = [_verdict(scene, box) for scene, box in grasps]
+        shortest = [
+            {"configuration": scene.name, "objective": format_objective(pair), "length": 1}
+            for scene in scenes
+            for pair in two_goal_objectives(scene.symbols)
+        ]
+        write_table(folder / "verdicts.parquet", pa.Table.from_pylist(verdicts, schema=VERDICTS))
+        write_table(folder / "shortest.parquet", pa.Table.from_pylist(shortest, schema=SHORTEST))
+        built(folder).save(folder / "dataset")
+        return folder
+
+
+def _write_whole_scene(folder: Path) -> None:
+    """A scene with every field that there is, and the file of a mesh."""
+    scene = json.loads((folder / "kitchen.json").read_text())
+    scene |= {"domain": "pick_and_place"}
+    scene["robot"] |= {"height": 0.0, "tilt": [0.0, 0.0], "joints": {"r_shoulder_pan_joint": -1.0}}
+    tile = {"name": "tile", "size": [0.02, 0.06, 0.1], "position": [0.62, 0.22, 0.61]}
+    turned = [0.0, 0.7071068, 0.0, 0.7071068]
+    lying = {"quaternion": turned, "on": "counter", "colour": "#aa0000"}
+    scene["boxes"].append(tile | lying | {"grasps": [[0, 0, 0.08, *turned]]})
+    wedge = next(box for box in scene["boxes"] if box["name"] == "wedge")
+    corners = wedge.pop("vertices")
+    lines = [f"v {x} {y} {z}" for x, y, z in corners] + ["f 1 2 3", "f 5 6 7"]
+    (folder / "wedge.obj").write_text("\n".join(lines) + "\n")
+    wedge["mesh"] = "wedge.obj"
+    (folder / "whole.json").write_text(json.dumps(scene))
+
+
+def _verdict(scene: Scene, box: str) -> dict[str, object]:
+    return {
+        "configuration": scene.name,
+        "skeleton": f"(grasp pr2L {box})",
+        "length": 1,
+        "feasible": box != "blue",
+        "failure_constraint": "reach" if box == "blue" else None,
+        "states": [0.1 * step for step in range(42)] if box != "blue" else None,
+    }
+
+
+def built(folder: Path) -> Dataset:
+    """The data set of the tables in a folder."""
+    scenes = load_scenes(folder / "scenes.json").scenes
+    objectives = two_goal_objectives(scenes[0].symbols)[:5]
+    verdicts, shortest = folder / "verdicts.parquet", folder / "shortest.parquet"
+    return build_dataset(scenes, verdicts, shortest, objectives, 0)
