@@ -10,6 +10,7 @@ import resource
 import subprocess
 import sys
 import tempfile
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -32,7 +33,8 @@ SEED = 20_004
 SCENES = 20
 """Configurations per setup, as in ``version.py``."""
 COUNT = 100
-"""How many random sequences of setup a the coarse bound judges; a tenth of them get paths."""
+"""Random sequences: half of them get verdicts, in setup e.10, a tenth get paths, in setup a. The
+enumeration runs in a tenth as many configurations."""
 LONG, STEPS, ATTEMPTS = 40, 100, 200
 """Actions of the long program, steps of the solver on it, and actions tried on the way."""
 RUNS = 4
@@ -126,12 +128,12 @@ def measure(count: int = COUNT) -> dict[str, Any]:
 
 
 def coarse_bound(pair: Pair, count: int) -> dict[str, Any]:
-    """Verdicts of the coarse bound along random walks that end at the first infeasible one.
+    """Verdicts of the coarse bound whose prefix is feasible.
 
-    In the setup of the enumeration, and a tenth as many in that of the largest searches.
+    Those that the enumeration of setup a asks for, and in the setup of the largest searches those
+    along random walks that end at the first infeasible one.
     """
-    walks = {"a": count, "e10": max(1, count // 10)}
-    verdicts = [v for setup, number in walks.items() for v in _walks(pair, setup, number)]
+    verdicts = [*_enumerated(pair, max(1, count // 10)), *_walks(pair, "e10", max(1, count // 2))]
     same = {feasible: [v for v in verdicts if _both(v, feasible)] for feasible in (True, False)}
     unexplained = [v for v in same[False] if v["new"]["starts"]]
     return {
@@ -140,7 +142,32 @@ def coarse_bound(pair: Pair, count: int) -> dict[str, Any]:
         "infeasible_without_fact": summary(unexplained),
         "changed_to_feasible": sum(_only(v, "new") for v in verdicts),
         "changed_to_infeasible": sum(_only(v, "old") for v in verdicts),
+        "refused_now": Counter(filter(None, (v["refused_for"] for v in verdicts))),
     }
+
+
+def _enumerated(pair: Pair, scenes: int) -> Iterator[dict[str, Any]]:
+    """Verdicts of both versions on what the enumeration asks for, by version."""
+    for number in range(scenes):
+        feasible: set[tuple[str, ...]] = {()}
+        for words in pair.new.ask("enumerated", "a", number):
+            if tuple(words[:-1]) in feasible:
+                verdict = _verdict(pair, "a", number, words)
+                feasible |= {tuple(words)} if _both(verdict, True) else set()
+                yield verdict
+
+
+def _verdict(pair: Pair, setup: str, number: int, words: list[str]) -> dict[str, Any]:
+    """Of both versions, and for what today's verification refuses what only the older one finds.
+
+    Joints have soft limits now, for one, which the older version does not know.
+    """
+    verdict = pair.ask("coarse", setup, number, words)
+    verdict["refused_for"] = None
+    if _only(verdict, "old"):
+        found = pair.old.ask("keyframes", setup, number, words)
+        verdict["refused_for"] = pair.new.ask("refusal", setup, number, words, *found)
+    return verdict
 
 
 def _walks(pair: Pair, setup: str, count: int) -> Iterator[dict[str, Any]]:
@@ -151,7 +178,7 @@ def _walks(pair: Pair, setup: str, count: int) -> Iterator[dict[str, Any]]:
         words: list[str] = []
         while len(words) < max(LENGTHS):
             words.append(_random(pair, setup, number, words, rng))
-            verdict = pair.ask("coarse", setup, number, words)
+            verdict = _verdict(pair, setup, number, words)
             yield verdict
             if not _both(verdict, True):
                 break
@@ -208,7 +235,7 @@ def _feasible(
 
 def enumeration(pair: Pair, count: int) -> dict[str, Any]:
     """Verdicts per second of the stage that enumerates setup a."""
-    answers = [pair.ask("enumeration", "a", number) for number in range(max(1, count // 50))]
+    answers = [pair.ask("enumeration", "a", number) for number in range(max(1, count // 20))]
     figures = summary(answers)
     totals = {v: sum(a[v]["seconds"] for a in answers) for v in VERSIONS}
     rates = {v: sum(a[v]["verdicts"] for a in answers) / totals[v] for v in VERSIONS}
@@ -244,7 +271,9 @@ def coarse_step(pair: Pair, count: int) -> dict[str, Any]:
     """One step of the solver on a program of 40 actions with ten boxes."""
     rng = np.random.default_rng([SEED, 2])
     words = _feasible(pair, "e10", 0, LONG, rng)
-    return summary([pair.ask("step", "e10", 0, words, STEPS) for _ in range(RUNS)])
+    runs = [pair.ask("step", "e10", 0, words, STEPS) for _ in range(RUNS)]
+    sizes = {f"{v}_{size}": runs[0][v][size] for v in VERSIONS for size in ("variables", "rows")}
+    return summary(runs) | sizes
 
 
 def processes() -> dict[str, Any]:

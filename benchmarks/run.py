@@ -19,6 +19,7 @@ from typing import Any
 
 import against
 import coarse
+import limits
 import path
 import pipeline
 import witness
@@ -54,6 +55,7 @@ MEASURES: dict[str, Callable[[int], Any]] = {
     "training": lambda count: pipeline.training(),
     "memory": lambda count: pipeline.memory(),
     "against": against.measure,
+    "limits": lambda count: limits.measure(),
     "false_infeasible": lambda count: witness.measure(),
     "minutes": lambda count: pipeline.minutes(),
 }

@@ -6,6 +6,7 @@ have, under either name. Times are CPU seconds of this process.
 """
 
 import json
+import re
 import sys
 import tempfile
 import time
@@ -115,17 +116,60 @@ def path_verdict(setup: str, number: int, words: list[str]) -> dict[str, Any]:
     return {"feasible": result.feasible, "seconds": time.process_time() - began}
 
 
+def enumerated(setup: str, number: int) -> list[list[str]]:
+    """The skeletons of all verdicts that the enumeration of a configuration asks for, in order."""
+    with tempfile.TemporaryDirectory() as folder:
+        shard = _shard(scenes(setup)[number], Path(folder))
+        skeletons = pq.read_table(shard / "verdicts.parquet", columns=["skeleton"])["skeleton"]
+        return [re.findall(r"\([^)]*\)", skeleton) for skeleton in skeletons.to_pylist()]
+
+
+def keyframes(setup: str, number: int, words: list[str]) -> list[list[Any]]:
+    """The coarse solution: joint values and box poses at every switch, then after every action."""
+    place = here(setup, number)
+    result = place.bounds.coarse(place.skeleton(words))
+    names = ("at_switch", "after_action") if hasattr(result, "at_switch") else _FORMER
+    return [[_plain(frame) for frame in getattr(result, name)] for name in names]
+
+
+_FORMER = ("contacts", "retreated")
+"""What keyframes were called."""
+
+
+def _plain(frame: Any) -> Any:
+    return frame.q.tolist(), {name: pose.tolist() for name, pose in frame.boxes.items()}
+
+
+def refusal(
+    setup: str, number: int, words: list[str], at_switch: Any, after_action: Any
+) -> str | None:
+    """The sort of constraint by which this version's verification refuses another's keyframes."""
+    verify, results = import_module("guided_lgp.bounds.verify"), either("bounds.results")
+    frames = [
+        [
+            results.Keyframe(np.array(q), {name: np.array(p) for name, p in boxes.items()})
+            for q, boxes in given
+        ]
+        for given in (at_switch, after_action)
+    ]
+    world = import_module("guided_lgp.scene.world").world_of(scenes(setup)[number])
+    found = verify.verify_keyframes(world, here(setup, number).skeleton(words), *frames)
+    return None if found is None else _kind(found.constraint)
+
+
+def _kind(constraint: str) -> str:
+    """Of what sort it is, whatever it is about."""
+    return "joint limit" if constraint.startswith("joint limit") else constraint.split()[0]
+
+
 def enumeration(setup: str, number: int) -> dict[str, Any]:
     """All verdicts of one configuration, as the stage of the pipeline asks for them."""
+    scene = scenes(setup)[number]
     with tempfile.TemporaryDirectory() as folder:
-        given = {"limits": PARAMETERS.enumerate_sequences, "bounds": PARAMETERS.bounds}
-        if "sources" in enumerate_sequences.Task.__annotations__:
-            given["sources"] = ""
-        task = enumerate_sequences.Task(scenes(setup)[number], **given, folder=Path(folder))
         began = time.process_time()
-        enumerate_sequences.write_shard(task)
+        shard = _shard(scene, Path(folder))
         seconds = time.process_time() - began
-        rows = pq.read_metadata(task.shard / "verdicts.parquet").num_rows
+        rows = pq.read_metadata(shard / "verdicts.parquet").num_rows
     return {"verdicts": rows, "seconds": seconds}
 
 
@@ -135,6 +179,19 @@ def whole_plan(setup: str, number: int, goals: list[str]) -> dict[str, Any]:
     began = time.process_time()
     result = planning.plan(place.scene, goals)
     return {"feasible": result.path is not None, "seconds": time.process_time() - began}
+
+
+def _shard(scene: Any, folder: Path) -> Path:
+    """The tables of one configuration, as the stage writes them."""
+    given: dict[str, Any] = {
+        "limits": PARAMETERS.enumerate_sequences,
+        "bounds": PARAMETERS.bounds,
+    }
+    if "sources" in enumerate_sequences.Task.__annotations__:
+        given["sources"] = ""
+    task = enumerate_sequences.Task(scene, **given, folder=folder)
+    enumerate_sequences.write_shard(task)
+    return task.shard
 
 
 class Recorder:
@@ -167,12 +224,16 @@ def step(setup: str, number: int, words: list[str], steps: int) -> dict[str, Any
     endless = replace(solvers.Settings(), tolerance=-1.0, steps=steps, patience=steps)
     began = time.process_time()
     solution = solver.solve(program, values, endless)
-    return {"seconds": (time.process_time() - began) / solution.steps}
+    seconds = (time.process_time() - began) / solution.steps
+    return {"seconds": seconds, "variables": program.variables, "rows": program.rows}
 
 
 REQUESTS: dict[str, Callable[..., Any]] = {
     "choices": choices,
     "coarse": coarse_verdict,
+    "enumerated": enumerated,
+    "keyframes": keyframes,
+    "refusal": refusal,
     "path": path_verdict,
     "enumeration": enumeration,
     "step": step,

@@ -42,10 +42,13 @@ def test_every_part_has_a_table_and_ratios_come_from_one_run() -> None:
     twice = {"n": 5, "old_median_ms": 20.0, "new_median_ms": 10.0, "ratio": 2.0}
     unchanged = {"changed_to_feasible": 3, "changed_to_infeasible": 0}
     kinds = ("feasible", "infeasible", "infeasible_without_fact")
+    sizes = ("variables", "rows")
     against = {
         "baseline": "50577ca",
-        "coarse_bound": dict.fromkeys(kinds, twice) | unchanged,
-        "coarse_step": twice,
+        "coarse_bound": dict.fromkeys(kinds, twice)
+        | unchanged
+        | {"refused_now": {"joint limit": 2}},
+        "coarse_step": twice | {f"{v}_{n}": 900 for v in ("old", "new") for n in sizes},
         "enumeration": twice,
         "path_bound": {"2": twice | unchanged, "10": {"n": 0} | unchanged},
         "plan_process": {"3": twice},
@@ -54,6 +57,10 @@ def test_every_part_has_a_table_and_ratios_come_from_one_run() -> None:
         {
             "machine": MACHINE,
             "against": against,
+            "limits": {
+                "checks": {"per_s": 2e6, "at_operations_per_s": 8e6, "at_memory_per_s": 4e7},
+                "coarse_feasible": {"n": 80, "median_ms": 2.0, "floor_ms": 0.5},
+            },
             "minutes": {"repro": 12.34, "test": 7.0, "load_before": 0.1},
             "false_infeasible": {"n": 600, "found": 3, "witnesses": []},
             "coarse_bound": {"4": coarse | {"ipopt": ipopt}},
@@ -65,10 +72,11 @@ def test_every_part_has_a_table_and_ratios_come_from_one_run() -> None:
         }
     )
     assert "A CPU, 2 cores, 8.0 GB" in page
-    assert page.count("\n**") == 9
+    assert page.count("\n**") == 10
     lines = page.splitlines()
     assert "| path bound, K = 2 | 20.0 | 10.0 | 2.0× | 5 |" in lines
     assert "| 12.3 | 7.0 | 0.1 |" in lines
+    assert "| feasible coarse verdict | 2.00 ms | 0.50 ms | its compiled code | 25.0% |" in lines
     assert "| 600 | 3 | 0.5% |" in lines
     assert not any("K = 10" in line for line in lines)
     assert "Verdicts that changed: 9 from infeasible to feasible, 0 from" in page
