@@ -4,6 +4,7 @@ import time
 from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
+from math import isnan
 
 from guided_lgp.bounds.coordination.itinerary import Itinerary, itinerary
 from guided_lgp.bounds.coordination.moments import Moments
@@ -103,5 +104,7 @@ class Coordinator:
                         "deepest_penetration_m": report.deepest_penetration,
                     },
                 )
+            if isnan(report.violation.time):
+                return None  # what is wrong is nothing that another moment would mend
             moments.block(found[motion.row_at(report.violation.time)])
         return None
