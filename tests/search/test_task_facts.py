@@ -8,7 +8,7 @@ from guided_lgp.bounds.deadline import Deadline, OutOfTimeError
 from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.logic import parse_objective, parse_skeleton
 from guided_lgp.params import load_planning
-from guided_lgp.scene import Box, Scene, load_scene
+from guided_lgp.scene import Box, Scene, load_scene, parse_scene
 from guided_lgp.scene.bodies import Obstacle
 from guided_lgp.search.facts import KINDS, Finding, TaskFacts
 
@@ -108,6 +108,39 @@ def test_who_reaches_what() -> None:
     assert task.reachable_by("parcel", "farleft") == ("pr2L",)
     assert task.reachable_by("parcel", "farright") == ()
     assert found(task.after_search()).kind == "way"
+
+
+def panda(*, ahead: float, on: str = "near") -> Scene:
+    """A table before the arm, another one farther ahead, and a box."""
+    tops = {"near": (0.5, 0.25, 0.2), "far": (ahead, -0.25, 0.2)}
+    tables = [
+        {"name": name, "position": top, "half_extents": (0.15, 0.15)} for name, top in tops.items()
+    ]
+    position = (*tops[on][:2], 0.25)
+    red = {"name": "red", "size": (0.12, 0.06, 0.1), "position": position, "on": on}
+    return parse_scene({"robot": {"model": "panda"}, "tables": tables, "boxes": [red]}, "panda")
+
+
+def test_no_arm_is_longer_than_its_links() -> None:
+    """Also of arms that are not built like a human's."""
+    finding = found(facts(panda(ahead=1.2), "(on red far)").before_search())
+    assert (finding.kind, finding.text) == ("reach", "far is out of reach of the arm")
+    assert facts(panda(ahead=0.7), "(on red far)").before_search() is None
+    away = found(facts(panda(ahead=1.3, on="far"), "(on red near)").before_search())
+    assert away.text == "red is out of reach of the arm"
+    given = panda(ahead=1.2).boxes[0].model_copy(update={"grasps": ((0.9, 0, 0, 0, 0, 0, 1),)})
+    scene = panda(ahead=1.2).model_copy(update={"boxes": (given,)})
+    assert facts(scene, "(on red far)").before_search() is None, "a long handle"
+
+
+def test_full_hands_are_no_lack_of_reach() -> None:
+    held = [
+        {"name": name, "size": (0.15, 0.07, 0.1), "on": gripper}
+        for name, gripper in (("x", "pr2L"), ("y", "pr2R"))
+    ]
+    document = NEAR.model_dump(mode="json")
+    document["boxes"] = [document["boxes"][0], *held]
+    assert facts(parse_scene(document, "full"), "(on red tab2)").before_search() is None
 
 
 def test_boxes_that_block_each_other_are_named() -> None:

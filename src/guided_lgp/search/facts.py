@@ -25,6 +25,7 @@ from guided_lgp.logic import (
     successor,
     unsatisfied,
 )
+from guided_lgp.logic.domain import GroundInstruction
 from guided_lgp.logic.grounding import ground_instructions
 from guided_lgp.logic.objectives import parents_wanted_by
 from guided_lgp.robots import Robot
@@ -32,6 +33,7 @@ from guided_lgp.scene.bodies import Body, Box, Table
 from guided_lgp.scene.footprints import footprint, gap, inner_radius, inset, seat
 from guided_lgp.scene.tolerances import MARGIN
 from guided_lgp.search.conflicts import Conflicts
+from guided_lgp.search.lengths import too_far
 from guided_lgp.search.surroundings import barriers
 
 Kind = Literal["width", "reach", "room", "way", "blocked", "part", "posture"]
@@ -151,8 +153,15 @@ class TaskFacts:
                 f"{body} is too wide for the fingers: {narrowest:.3f} m at its narrowest side",
                 f"a side of at most {widest:.3f} m",
             )
-        if all(map(self._bounds.out_of_reach, ((move,) for move in self._takings(body)))):
+        takings = self._takings(body)
+        if takings and all(map(self._cannot_take, takings)):
             yield self._out_of_reach(body)
+
+    def _cannot_take(self, taking: Action) -> bool:
+        """Whether it is proved that an arm does not reach a box at its start."""
+        ground = self._symbols.domain.bind(taking)
+        short = too_far(self.scene, ground.parent, self._boxes[ground.body])
+        return short or self._bounds.out_of_reach((taking,))
 
     def _denied(self, body: str, parents: frozenset[str]) -> bool:
         """Whether all parents are furniture on which no arm can put a body."""
@@ -162,7 +171,13 @@ class TaskFacts:
             if one.body == body and one.parent in parents
         ]
         surfaces = set(self._symbols.surfaces)
-        return parents <= surfaces and all(map(self._bounds.facts.never, ways))
+        return parents <= surfaces and all(map(self._cannot_put, ways))
+
+    def _cannot_put(self, ground: GroundInstruction) -> bool:
+        """Whether it is proved that an arm cannot put a body on furniture."""
+        support = next(one for one in self.scene.supports if one.name == ground.parent)
+        short = too_far(self.scene, ground.actor, self._boxes[ground.body], support)
+        return short or self._bounds.facts.never(ground)
 
     def _out_of_reach(self, names: str) -> Finding:
         text = f"{names} is out of reach of {self._every_arm}"
