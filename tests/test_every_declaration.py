@@ -26,6 +26,7 @@ from guided_lgp.domains import domain_names, load_domain
 from guided_lgp.errors import InputError
 from guided_lgp.logic import (
     Action,
+    Domain,
     Goal,
     Skeleton,
     applicable_actions,
@@ -60,6 +61,11 @@ INSTRUCTIONS = [
 ]
 GOAL_TYPES = [
     (name, goal_type.name) for name in domain_names() for goal_type in load_domain(name).goal_types
+]
+FURTHER_GOALS = [
+    (name, goal_type.name)
+    for name in domain_names()
+    for goal_type in load_domain(name).further_goals
 ]
 
 
@@ -219,14 +225,53 @@ def test_a_missing_step_is_named_with_its_instruction(
                 check_motions(domain)
 
 
-@pytest.mark.parametrize("step", ["transit", "line_in", "switch", "line_out"])
-def test_an_instruction_without_one_of_its_steps_is_named(step: str) -> None:
-    domain = load_domain()
-    first, *others = domain.instructions
-    motion = tuple(term for term in first.motion if term.name != step)
-    less = replace(domain, instructions=(replace(first, motion=motion), *others))
-    with pytest.raises(InputError, match=f"instruction {first.name}, motion"):
-        check_motions(less)
+def without(parts: tuple[Any, ...]) -> list[tuple[Any, ...]]:
+    """The parts but for one, for each of them."""
+    return [parts[:number] + parts[number + 1 :] for number in range(len(parts))]
+
+
+def instead(domain: Domain, one: Any, other: Any) -> Domain:
+    """The domain with another declaration in place of one."""
+    lists = ("instructions", "goal_types", "further_goals")
+    changed = {
+        name: tuple(other if known == one else known for known in getattr(domain, name))
+        for name in lists
+    }
+    return replace(domain, extends=None, **changed)
+
+
+@pytest.mark.parametrize(("domain", "name"), INSTRUCTIONS)
+def test_an_instruction_without_one_of_its_parts_is_named(domain: str, name: str) -> None:
+    """Its parameters, its effect, what it says of its hand, and the steps of every motion."""
+    declared = load_domain(domain)
+    one = next(one for one in declared.instructions if one.name == name)
+    steps_of_all = ("transit", "line_in", "switch", "line_out")
+    motions = [tuple(term for term in one.motion if term.name != step) for step in steps_of_all]
+    less = [
+        *(replace(one, parameters=parameters) for parameters in without(one.parameters)),
+        replace(one, effect=()),
+        replace(one, precondition=one.precondition[1:]),
+        *(replace(one, motion=motion) for motion in motions),
+    ]
+    for changed in less:
+        with pytest.raises(InputError, match=rf"{domain}\.py: instruction {name}, \w+"):
+            check_motions(instead(declared, one, changed))
+
+
+@pytest.mark.parametrize(("domain", "name"), [*GOAL_TYPES, *FURTHER_GOALS])
+def test_a_goal_type_without_one_of_its_parts_is_named(domain: str, name: str) -> None:
+    """Its parameters and its numbers; its condition, where that is all it has."""
+    declared = load_domain(domain)
+    every = (*declared.goal_types, *declared.further_goals)
+    one = next(one for one in every if one.name == name)
+    less = [
+        *(replace(one, parameters=parameters) for parameters in without(one.parameters)),
+        *(replace(one, numbers=numbers) for numbers in without(one.numbers)),
+        replace(one, condition=(), final=(), lasting=()),
+    ]
+    for changed in less:
+        with pytest.raises(InputError, match=rf"{domain}\.py: goal type {name}, \w+"):
+            check_terms(instead(declared, one, changed))
 
 
 @pytest.mark.parametrize("policy", POLICIES)
