@@ -37,6 +37,8 @@ COUNT = 100
 enumeration runs in a tenth as many configurations."""
 LONG, STEPS, ATTEMPTS = 40, 100, 200
 """Actions of the long program, steps of the solver on it, and actions tried on the way."""
+NODES = 400_000
+"""Of the logic tree: the limit of the paper's tables."""
 RUNS = 4
 """Of the command per scene; the first one fills caches and is not counted."""
 TOWER = ("purple", "yellow", "blue", "green", "red", "tray")
@@ -276,6 +278,12 @@ def coarse_step(pair: Pair, count: int) -> dict[str, Any]:
     return summary(runs) | sizes
 
 
+def logic_tree(pair: Pair, count: int) -> dict[str, Any]:
+    """The symbolic search alone: as many nodes as the paper's baseline generates at most."""
+    answers = [pair.ask("logic_tree", "b", number % SCENES, NODES) for number in range(RUNS)]
+    return summary(answers) | {"nodes": answers[0]["new"]["nodes"]}
+
+
 def processes() -> dict[str, Any]:
     """The command, warm: a process of its own from start to end."""
     with baseline() as sources:
@@ -324,6 +332,7 @@ PARTS: dict[str, Callable[[Pair, int], Any]] = {
     "path_bound": path_bound,
     "enumeration": enumeration,
     "coarse_step": coarse_step,
+    "logic_tree": logic_tree,
     "plans": plans,
 }
 
@@ -339,6 +348,7 @@ def ratios(figures: dict[str, Any]) -> dict[str, Any]:
         "enumeration": figures["enumeration"].get("ratio"),
         "plan_process": _ratios(figures["plan_process"]),
         "coarse_step_k40": figures["coarse_step"].get("ratio"),
+        "logic_tree": figures["logic_tree"].get("ratio"),
     }
 
 

@@ -26,6 +26,7 @@ from guided_lgp.logic import applicable_actions, successor
 from guided_lgp.params import load_params
 from guided_lgp.paths import SOURCES
 from guided_lgp.scene import generate
+from guided_lgp.search.tree import LogicTree
 
 PARAMETERS = load_params(SOURCES / "params.yaml")
 SEED = 20_004
@@ -194,6 +195,17 @@ def _shard(scene: Any, folder: Path) -> Path:
     return task.shard
 
 
+def logic_tree(setup: str, number: int, nodes: int) -> dict[str, Any]:
+    """The first nodes of the logic tree, breadth-first, as the baseline generates them."""
+    scene, node = scenes(setup)[number], 0
+    began = time.process_time()
+    tree = LogicTree(scene.symbols, scene.state)
+    while len(tree) < nodes:
+        tree.expand(node)
+        node += 1
+    return {"nodes": len(tree), "seconds": time.process_time() - began}
+
+
 class Recorder:
     """A solver that remembers the last program."""
 
@@ -237,6 +249,7 @@ REQUESTS: dict[str, Callable[..., Any]] = {
     "path": path_verdict,
     "enumeration": enumeration,
     "step": step,
+    "logic_tree": logic_tree,
     "plan": whole_plan,
 }
 
