@@ -68,12 +68,11 @@ def set_joint(plan: dict[str, Any], joint: str, value: float) -> None:
 
 def swing(plan: dict[str, Any], **by: float) -> None:
     """The idle arm leaves its place and comes back before anything is grasped, slowly."""
-    rows = plan["path"]["q"][:60]
-    assert plan["path"]["attachments"][0]["start"] > len(rows)
+    rows = plan["path"]["q"][: plan["path"]["attachments"][0]["start"]]
     for row, part in zip(rows, np.sin(np.linspace(0, np.pi, len(rows))) ** 2, strict=True):
         for joint, angle in by.items():
             row[column(plan, joint)] += part * angle
-    plan["path"]["times"] = [3 * time for time in plan["path"]["times"]]
+    plan["path"]["times"] = [5 * time for time in plan["path"]["times"]]
 
 
 @pytest.mark.parametrize("task", TASKS)
