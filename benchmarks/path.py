@@ -81,7 +81,7 @@ def run_task(task: Task) -> list[Sample]:
 def _sample(
     length: int, scene: Scene, coarse: CoarseBound, path: PathBound, rng: np.random.Generator
 ) -> Sample:
-    start = _feasible(length, scene, coarse, rng)
+    start = feasible(length, scene, coarse, rng)
     began = time.perf_counter()
     result = path.solve(start)
     elapsed = time.perf_counter() - began
@@ -105,7 +105,7 @@ def _figures(samples: list[Sample]) -> dict[str, Any]:
     }
 
 
-def _feasible(
+def feasible(
     length: int, scene: Scene, coarse: CoarseBound, rng: np.random.Generator
 ) -> CoarseResult:
     """A random sequence that the coarse bound says is feasible."""

@@ -21,7 +21,7 @@ from guided_lgp.logic import Skeleton
 from guided_lgp.scene import Scene
 from guided_lgp.scene.world import world_of
 
-_ATTEMPTS = 4
+_ATTEMPTS = 3
 """Schedules that are verified, each without the faults of those before."""
 
 

@@ -23,7 +23,7 @@ _FINE = 4
 """Samples per tick that are averaged."""
 _SHARE = 0.99
 """Share of the limits that is used, so that the rounded rows keep them too."""
-_FINGER_SHARE = 0.9
+_FINGER_SHARE = 0.97
 """Share of their velocity limit at which fingers move."""
 
 

@@ -14,7 +14,7 @@ from guided_lgp.bounds.coordination.roads import Edge, Node, Road
 
 _WAIT = 5
 """Ticks after which an arm that waits looks again."""
-_EFFORTS = ((1.0, 400), (2.0, 800), (5.0, 2000))
+_EFFORTS = ((1.0, 300), (2.0, 500), (5.0, 1000))
 """Weights of the estimate, and states that are expanded with it at most: the heavier, the sooner a
 schedule is found, and the longer it may be."""
 
