@@ -14,12 +14,13 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from statistics import fmean
+from statistics import fmean, median
 from typing import Any
 
 import numpy as np
 
 from guided_lgp import parallel, plan
+from guided_lgp.bounds.coordination import Coordinator
 from guided_lgp.bounds.execution import Conditions, execute
 from guided_lgp.bounds.execution.conditions import AS_PLANNED
 from guided_lgp.bounds.results import Array
@@ -48,12 +49,22 @@ DRAWS = 500
 FRICTIONS = (0.6, 1.0)
 NOISE_M, CLOSED_LOOP_NOISE_M = 0.005, 0.008
 KINDS = ("moved", "dropped", "taken away")
+HANDS = {"both_arms": 2, "one_arm": 1}
 LIMITS = ("joint limit", "velocity", "acceleration", "jerk", "effort")
 
 logger = logging.getLogger("execution")
 
 
-def course(length: int, number: int, wanted: Callable[[Scene, Skeleton], bool]) -> Course | None:
+@dataclass(frozen=True)
+class Planned:
+    """A random plan as shipped."""
+
+    course: Course
+    in_turn_s: float
+    """How long the same actions take one after the other, with all ways home."""
+
+
+def planned(length: int, number: int, wanted: Callable[[Scene, Skeleton], bool]) -> Planned | None:
     """A random feasible sequence of setup a, planned; the same for everyone."""
     (scene,) = generate("a", 1, SEED + number, f"execution-{number:03d}").scenes
     rng = np.random.default_rng([SEED, length, number])
@@ -61,10 +72,12 @@ def course(length: int, number: int, wanted: Callable[[Scene, Skeleton], bool]) 
     for _ in range(DRAWS):
         skeleton = _drawn(scene, length, rng)
         if wanted(scene, skeleton) and bounds.coarse(skeleton).feasible:
-            trajectory = bounds.path(skeleton).trajectory
-            if trajectory is not None:
+            in_turn = bounds.path(skeleton)
+            path = Coordinator(scene).shorten(in_turn) if in_turn.feasible else in_turn
+            if path.trajectory is not None and in_turn.trajectory is not None:
                 goals = goals_after(scene.state, skeleton)
-                return Course(scene, goals, skeleton, trajectory)
+                shipped = Course(scene, goals, path.skeleton, path.trajectory)
+                return Planned(shipped, float(in_turn.trajectory.times[-1]))
     return None
 
 
@@ -113,9 +126,10 @@ class Task:
 
 def carried_out(task: Task) -> dict[str, Any] | None:
     """What becomes of a random plan."""
-    found = course(task.length, task.number, task.wanted)
-    if found is None:
+    drawn = planned(task.length, task.number, task.wanted)
+    if drawn is None:
         return None
+    found = drawn.course
     motion = (found.scene, found.skeleton, found.trajectory)
     report = execute(found.scene, found.objective, *motion[1:], task.conditions)
     q, times = _moving(found), found.trajectory.times
@@ -131,6 +145,8 @@ def carried_out(task: Task) -> dict[str, Any] | None:
         "rows_outside_limits": outside,
         "waiting_s": waiting(found, q),
         "duration_s": float(times[-1]),
+        "duration_ratio": float(times[-1]) / drawn.in_turn_s,
+        "hands": len({action.symbols[0] for action in found.skeleton}),
         "clearance_mm": round(1000 * clearance_of(*motion).distance, 2),
     }
 
@@ -164,13 +180,13 @@ def built(setup: str, conditions: Conditions, closed: bool, number: int) -> dict
 
 def disturbed(number: int) -> dict[str, Any] | None:
     """What becomes of a plan in closed loop when a box is moved, dropped or taken away."""
-    found, kind = course(4, number, single), KINDS[number % len(KINDS)]
-    if found is None:
+    drawn, kind = planned(4, number, single), KINDS[number % len(KINDS)]
+    if drawn is None:
         return None
     rng = np.random.default_rng([SEED, number])
-    report = follow(found, disturb=partial(_disturb, kind, rng), timeout=60).report
+    report = follow(drawn.course, disturb=partial(_disturb, kind, rng), timeout=60).report
     return {
-        "scene": found.scene.name,
+        "scene": drawn.course.scene.name,
         "kind": kind,
         "succeeded": report.success or bool(report.fault),
         "fault": report.fault,
@@ -212,9 +228,16 @@ def plans(count: int) -> dict[str, Any]:
         "succeeded": sum(row["succeeded"] for row in rows),
         "rows_outside_limits": sum(kinds.values()),
         "rows_outside_by_kind": kinds,
+        "duration_ratio": {name: _ratios(rows, hands) for name, hands in HANDS.items()},
         "waiting_share": fmean(row["waiting_s"] / row["duration_s"] for row in rows),
         "smallest_clearance_mm": min(row["clearance_mm"] for row in rows),
     }
+
+
+def _ratios(rows: list[dict[str, Any]], hands: int) -> dict[str, float] | None:
+    """Of the durations of plans with so many hands and those of the same actions in turn."""
+    ratios = [row["duration_ratio"] for row in rows if row["hands"] == hands]
+    return {"median": median(ratios), "worst": max(ratios)} if ratios else None
 
 
 def under_friction(

@@ -50,7 +50,7 @@ REPAIR = 2
 TRIED = 4
 """Sequences whose geometry is tried before a plan is searched for anew."""
 AWAY = 0.08
-"""m that a hand has gone from where it acted when somebody looks."""
+"""m that hands are from where they act when somebody looks."""
 _HOME = 2e-3
 """rad: joints nearer to home than this are there; motors hold no better."""
 _FLOOR = 0.0
@@ -133,7 +133,9 @@ def replan(
         path = bounds.path(way) if way else stay(scene)
         if path.feasible:
             return Replanned("kept" if way == rest else "repaired", path, scene, goals)
-    found = search(scene, list(map(str, goals)), params=params, timeout=timeout, where=where)
+    found = search(
+        scene, list(map(str, goals)), params=params, timeout=timeout, where=where, coordinate=False
+    )
     return Replanned("planned anew", found.path, found.scene, goals, found.explanation)
 
 
@@ -265,10 +267,10 @@ def _as_it_will_be(course: Course, conditions: Conditions, made: int) -> Traject
 
 
 def first_actions(course: Course) -> Course:
-    """The first action, and more where nobody can look after it; the hand has left its box then.
+    """The first action, and more where nobody can look after it; the hands are free then.
 
-    Scenes do not know hands that carry boxes on the one that they hold, and a hand that goes on to
-    its next action before it has gone ``AWAY`` cannot be stopped.
+    Scenes do not know hands that carry boxes on the one that they hold, and a plan in which all
+    arms move has moments at which one of them is always busy.
     """
     rows = switches_of(course.scene, course.skeleton, course.trajectory)
     if isinstance(rows, Violation):
@@ -282,14 +284,21 @@ def first_actions(course: Course) -> Course:
 
 
 def _away(course: Course, rows: Sequence[int], count: int) -> int | None:
-    """The row at which the hand has left where it acted, before the next action's switch."""
+    """The first row after an action at which no hand is where it acted, or will act next."""
     robot, trajectory = course.scene.robot.description, course.trajectory
-    gripper = course.skeleton[count - 1].symbols[0]
     columns = [trajectory.joint_names.index(name) for name in robot.joint_names]
-    between = trajectory.q[rows[count - 1] : rows[count], columns]
-    tools = course.scene.robot.tool_poses(between, (gripper,))[gripper][:, :3]
-    away = np.linalg.norm(tools - tools[:1], axis=1) >= AWAY
-    return rows[count - 1] + int(np.argmax(away)) if away.any() else None
+    tools = course.scene.robot.tool_poses(trajectory.q[:, columns])
+    first, last = rows[count - 1], rows[count]
+    away = np.ones(last - first, bool)
+    for gripper, poses in tools.items():
+        acts = [row for row, a in zip(rows, course.skeleton, strict=True) if gripper in a.symbols]
+        for row in (
+            *[row for row in acts if row <= first][-1:],
+            *[r for r in acts if r > first][:1],
+        ):
+            ways = poses[first:last, :3] - poses[row, :3]
+            away &= np.linalg.norm(ways, axis=1) >= AWAY
+    return first + int(np.argmax(away)) if away.any() else None
 
 
 def _cut(course: Course, count: int, row: int) -> Course:
