@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from guided_lgp.documents import read_json
 from guided_lgp.errors import InputError
@@ -20,6 +20,9 @@ HEIGHT = 0.02
 TILT = 0.1
 """How far (rad) an observed box may be tilted that stands on one of its faces."""
 
+_ALONG = 0.1
+"""Sine of the angle between a box's upright axis and the one along which fingers close on it."""
+
 Number = Annotated[float, Field(allow_inf_nan=False, ge=-100, le=100)]
 
 
@@ -28,6 +31,13 @@ class ObservedBox(Document):
 
     position: tuple[Number, Number, Number]
     quaternion: tuple[Number, Number, Number, Number] = (0.0, 0.0, 0.0, 1.0)
+
+    @field_validator("quaternion")
+    @classmethod
+    def _of_length_one(cls, quaternion: tuple[float, ...]) -> tuple[float, ...]:
+        if not math.isclose(math.hypot(*quaternion), 1.0, abs_tol=0.01):
+            raise ValueError("is not of length 1: [x, y, z, w]")
+        return quaternion
 
 
 class Observed(Document):
@@ -78,7 +88,8 @@ def observed_scene(scene: Scene, observed: Observed, where: str = "observed") ->
         boxes[box.name] = _put_down(box, below, f"{where}: boxes.{box.name}")
     for name, gripper in observed.held.items():
         tool = robot.tool_pose(robot.start, gripper)
-        grasp = _centred(compose(inverse(tool), _pose(observed.boxes[name])))
+        held = compose(inverse(tool), _pose(observed.boxes[name]))
+        grasp = _centred(held, f"{where}: held.{name}")
         boxes[name] = known[name].model_copy(update={"on": gripper, "grasp": grasp})
     changed = [boxes.get(box.name, box) for box in scene.boxes if box.fixed or box.name in boxes]
     document = scene.model_dump() | {
@@ -106,9 +117,11 @@ def _pose(box: ObservedBox) -> Array:
     return np.array([*box.position, *(turn / np.linalg.norm(turn))])
 
 
-def _centred(grasp: Array) -> tuple[float, ...]:
+def _centred(grasp: Array, where: str) -> tuple[float, ...]:
     """The pose (7,) of a box in the tool frame as planners know them: fingers across its sides."""
     turn = rotation_matrix(grasp[3:])
+    if math.hypot(turn[0, 2], turn[2, 2]) < _ALONG:
+        raise InputError(where, "is held from above and below", "fingers across its sides")
     across = int(np.argmax(np.abs(turn[1, :2])))
     turned = np.zeros((3, 3))
     turned[1, across] = math.copysign(1.0, turn[1, across])
@@ -120,8 +133,6 @@ def _centred(grasp: Array) -> tuple[float, ...]:
 
 def _level(box: Box, seen: ObservedBox, where: str) -> Box:
     """The box on the face that is nearest to being below; its height as seen."""
-    if not math.isclose(math.hypot(*seen.quaternion), 1.0, abs_tol=0.01):
-        raise InputError(f"{where}.quaternion", "is not of length 1", "[x, y, z, w]")
     turn = rotation_matrix(_pose(seen)[3:])
     up = int(np.argmax(np.abs(turn[2])))
     tilt = math.acos(min(1.0, abs(turn[2, up])))
@@ -130,11 +141,10 @@ def _level(box: Box, seen: ObservedBox, where: str) -> Box:
     upwards = np.array([0.0, 0.0, math.copysign(1.0, turn[2, up])])
     turn = _turn_between(turn[:, up], upwards) @ turn
     document = box.model_dump() | {"position": seen.position, "grasp": None}
-    if up == 2 and turn[2, 2] > 0:
-        return Box.model_validate(document | {"yaw": math.atan2(turn[1, 0], turn[0, 0])})
-    return Box.model_validate(
-        document | {"yaw": 0.0, "quaternion": tuple(quaternion(turn).tolist())}
-    )
+    placed: dict[str, object] = {"yaw": math.atan2(turn[1, 0], turn[0, 0])}
+    if up != 2 or turn[2, 2] < 0:
+        placed = {"yaw": 0.0, "quaternion": tuple(quaternion(turn).tolist())}
+    return validated(Box.model_validate, document | placed, where)
 
 
 def _turn_between(first: Array, second: Array) -> Array:

@@ -34,6 +34,9 @@ COMMANDS: tuple[tuple[str, ...], ...] = (
     *((stage, "--case", "rows") for stage in ("demonstrate", "replay_case")),
     ("train_case", "--case", "rows", "--seed", "1", "--timeout", "60"),
     ("evaluate_case", "--case", "rows", "--training", "rivals"),
+    ("replan", "plan.json", "--observed", "state.json", "--after", "1", "--out", "rest.json"),
+    ("execute", "plan.json", "--grip", "friction", "--friction", "0.6", "--force", "20"),
+    ("execute", "plan.json", "--noise", "0.008", "--seed", "1", "--closed-loop", "--json"),
     ("schema", "scene"),
     ("examples", "new"),
     ("mlflow", "ui", "--port", "5001"),
@@ -56,6 +59,9 @@ class Commands:
     name = "commands"
     share = 1.0
 
+    def __post_init__(self) -> None:
+        tuple(self._inputs())  # made now, not while a command is judged
+
     def attempt(self, seed: int, number: int) -> None:
         """Run a command with one to three wrong words."""
         rng = np.random.default_rng(np.random.SeedSequence([seed, number]))
@@ -63,13 +69,14 @@ class Commands:
         with TemporaryDirectory() as top, _harmless():
             folder = Path(top, "a", "b", "c", "d")
             folder.mkdir(parents=True)
-            for file in (self.examples.scenes / "plan.json", *self._inputs()):
+            for file in self._inputs():
                 shutil.copy(file, folder)
             with chdir(folder):
                 run([*words, *_END.get(words[0] if words else "", ())])
 
     def _inputs(self) -> Iterator[Path]:
-        yield self.examples.scenes / "three_boxes.json"
+        for name in ("plan.json", "three_boxes.json", "observed/state.json"):
+            yield self.examples.scenes / name
         yield self.examples.parameters / "params.yaml"
         yield self.examples.parameters / "planning.yaml"
 
@@ -130,10 +137,14 @@ def _as_argument(word: str) -> str:
 
 @contextmanager
 def _harmless() -> Iterator[None]:
-    """No server is started, no stage computes, nothing is recorded."""
+    """No server is started, no stage computes, nothing is carried out or recorded."""
     cases = (f"guided_lgp.cases.{name}" for name in _CASES)
     modules = map(import_module, (*cli.STAGES.values(), *cases))
     runs = [patch.object(module, "run", Mock()) for module in modules]
+    runs += [
+        patch(f"guided_lgp.{place}", Mock(side_effect=SystemExit(0)))
+        for place in ("replanning.replan", "replanning.follow", "bounds.execution.execute")
+    ]
     view = patch.object(import_module("guided_lgp.view.live"), "view", Mock())
     others = (
         patch.object(tracking, "recorded", lambda *_: nullcontext()),

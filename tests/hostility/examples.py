@@ -10,7 +10,7 @@ import yaml
 from outputs import write_outputs
 from own_robot import describe, document, written
 
-from guided_lgp.bounds.plan_file import write_plan
+from guided_lgp.bounds.plan_file import read_plan, write_plan
 from guided_lgp.cases.outcomes import outcomes_of, times_of
 from guided_lgp.cases.policies import RIVALS, demonstrations_of
 from guided_lgp.cases.shards import write_kept
@@ -75,6 +75,7 @@ class Examples:
         assert found.path is not None
         objective = parse_objective(["(on red green)"])
         write_plan(folder / "plan.json", start, objective, found.path, {"planner": "guided"})
+        write_json(folder / "observed" / "state.json", _after_an_action(folder / "plan.json"))
         _write_whole_scene(folder)
         for number, goal in enumerate(GOALS):
             (folder / f"goal{number}.txt").write_text(goal)
@@ -154,6 +155,22 @@ class Examples:
         write_table(folder / "shortest.parquet", pa.Table.from_pylist(shortest, schema=SHORTEST))
         built(folder).save(folder / "dataset")
         return folder
+
+
+def _after_an_action(file: Path) -> dict[str, object]:
+    """What is observed after the first action of a plan, a grasp."""
+    found = read_plan(file)
+    keyframe, grasp = found.keyframes[0], found.skeleton[0]
+    robot = found.scene.robot.description
+    fixed = {name for arm in robot.arms.values() for name in arm.fingers.joints}
+    joints = dict(zip(found.joint_names, keyframe.q, strict=True))
+    boxes = {
+        name: {"position": box.position, "quaternion": box.quaternion}
+        for name, box in keyframe.boxes.items()
+    }
+    gripper, box = grasp.symbols
+    moved = {name: value for name, value in joints.items() if name not in fixed}
+    return {"joints": moved, "boxes": boxes, "held": {box: gripper}}
 
 
 def _write_whole_scene(folder: Path) -> None:

@@ -24,6 +24,7 @@ from guided_lgp.logic import (
     two_goal_objectives,
 )
 from guided_lgp.logic.objectives import check_objective
+from guided_lgp.observed import observed_scene, read_observed
 from guided_lgp.params import Params, load_planning, read_params
 from guided_lgp.paths import (
     EVALUATION,
@@ -112,6 +113,8 @@ def _documents(examples: Examples) -> Iterator[Loader]:
         read = partial(_validated_scene, name=name)
         yield Loader(f"scene {name}", examples.scenes, (name,), read, 2 / len(scenes))
     yield Loader("plan", examples.scenes, ("plan.json",), lambda f: read_plan(f / "plan.json"), 0.3)
+    folder, state = examples.scenes / "observed", ("state.json",)
+    yield Loader("observed state", folder, state, _observed, 0.5)
     yield Loader(
         "mesh", examples.scenes, ("wedge.obj",), partial(_validated_scene, name="whole.json"), 0.4
     )
@@ -140,6 +143,14 @@ def _validated_scene(folder: Path, name: str) -> object:
     scene = load_scene(folder / name)
     validate_scene(scene, str(folder / name))
     return scene
+
+
+def _observed(folder: Path) -> object:
+    scene = load_scene(folder.parent / "three_boxes.json")
+    file = folder / "state.json"
+    seen = observed_scene(scene, read_observed(file), str(file))
+    validate_scene(seen, str(file))
+    return seen
 
 
 def _objective(folder: Path, names: tuple[str, ...]) -> object:
