@@ -126,7 +126,8 @@ def measure(count: int = COUNT) -> dict[str, Any]:
     """Every ratio, and the times and numbers behind it."""
     with both() as pair:
         figures = {name: part(pair, count) for name, part in PARTS.items()}
-    return {"baseline": BASELINE} | figures | {"plan_process": processes()}
+    figures |= {"plan_process": processes(), "load": round(os.getloadavg()[2], 1)}
+    return {"baseline": BASELINE} | figures
 
 
 def coarse_bound(pair: Pair, count: int) -> dict[str, Any]:

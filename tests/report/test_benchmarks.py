@@ -45,6 +45,7 @@ def test_every_part_has_a_table_and_ratios_come_from_one_run() -> None:
     sizes = ("variables", "rows")
     against = {
         "baseline": "50577ca",
+        "load": 0.4,
         "coarse_bound": dict.fromkeys(kinds, twice)
         | unchanged
         | {"refused_now": {"joint limit": 2}},

@@ -83,6 +83,7 @@ def _against(metrics: Metrics) -> Table:
         ),
         (
             "Medians of CPU time, and of the ratios; both versions asked in turns in one run. "
+            f"Load of the machine: {number(metrics['load'], 1)}. "
             "Verdicts of the enumeration of setup a, and of random sequences of setup e.10; paths "
             f"of random sequences of setup a. Verdicts that changed: {more} from infeasible to "
             f"feasible, {less} from feasible to infeasible. {_refused(coarse['refused_now'])}",
