@@ -69,6 +69,7 @@ def main(parts: list[str], count: int) -> None:
     for name in parts or MEASURES:
         logger.info(name)
         figures[name] = MEASURES[name](count)
+        figures.setdefault("measured_on", {})[name] = figures["machine"]["cpu"]
         if name == "against":
             figures["speedup"] = against.ratios(figures[name])
         write_json(target, figures)

@@ -40,14 +40,22 @@ def benchmark_page(figures: Metrics) -> str:
         "memory": _memory,
     }
     shown = [build(figures[name]).markdown() for name, build in parts.items() if name in figures]
-    return "\n".join(["# Benchmarks", "", _machine(figures["machine"]), "", *shown])
+    about = _machine(figures["machine"]) + _others(figures)
+    return "\n".join(["# Benchmarks", "", about, "", *shown])
+
+
+def _others(figures: Metrics) -> str:
+    """Which parts are of an earlier run on another processor."""
+    here, parts = figures["machine"]["cpu"], figures.get("measured_on", {})
+    others = [f"{name} ({cpu})" for name, cpu in parts.items() if cpu != here]
+    return f" From an earlier run on another machine: {', '.join(others)}." if others else ""
 
 
 def _machine(machine: Metrics) -> str:
     packages = ", ".join(f"{name} {version}" for name, version in machine["packages"].items())
     return (
-        "Generated from `reports/metrics/benchmark.json`, which `make bench` writes in one run on "
-        f"one machine: {machine['cpu']}, {machine['cores']} cores, {machine['memory_gb']} GB, "
+        "Generated from `reports/metrics/benchmark.json`, which `make bench` writes: "
+        f"{machine['cpu']}, {machine['cores']} cores, {machine['memory_gb']} GB, "
         f"{machine['system']}, Python {machine['python']}, {packages}."
     )
 
@@ -87,9 +95,9 @@ def _against(metrics: Metrics) -> Table:
             "Verdicts of the enumeration of setup a, and of random sequences of setup e.10; paths "
             f"of random sequences of setup a. Verdicts that changed: {more} from infeasible to "
             f"feasible, {less} from feasible to infeasible. {_refused(coarse['refused_now'])}",
-            "The programs have grown, too: with 40 actions from "
-            f"{step['old_variables']} variables and {number(step['old_rows'], 0)} rows to "
-            f"{step['new_variables']} and {number(step['new_rows'], 0)}.",
+            "The program of 40 actions: "
+            f"{step['old_variables']} variables and {number(step['old_rows'], 0)} rows then, "
+            f"{step['new_variables']} and {number(step['new_rows'], 0)} now.",
         ),
     )
 
