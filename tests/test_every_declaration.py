@@ -297,7 +297,7 @@ def required_parts(name: str) -> list[tuple[str, ...]]:
     document = yaml.safe_load((ROBOTS / f"{name}.yaml").read_text())
     (arm, *_) = document["arms"]
     own = [("arms", arm, field) for field in ("joints", "home", "tool", "hand_links")]
-    return [("description",), ("base_link",), ("acceleration",), ("arms",), *own]
+    return [("description",), ("base_link",), ("arms",), *own]
 
 
 @pytest.mark.parametrize("name", robot_names())
