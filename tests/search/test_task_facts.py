@@ -1,5 +1,6 @@
 """Facts of tasks: proofs before a search, and what small parts of a scene say after one."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -99,6 +100,15 @@ def test_no_room_below_something_low() -> None:
     assert facts(small, "(on red board)").before_search() is None, "beside the lid"
     turned = roofed(0.09, yaw=0.1)
     assert facts(turned, "(on red board)").before_search() is None, "at its corners"
+
+
+def test_a_full_hand_may_be_emptied_first() -> None:
+    document = json.loads((ROOT / "tests" / "cases" / "handover_only.json").read_text())
+    document["boxes"].append({"name": "cube", "size": [0.05, 0.05, 0.05], "on": "pr2L"})
+    task = facts(parse_scene(document, "full"), "(held parcel)")
+    assert task.before_search() is None
+    assert task.graspable_by("parcel") == ("pr2L",)
+    assert task.reachable_by("parcel", "farleft") == ("pr2L",)
 
 
 def test_who_reaches_what() -> None:

@@ -5,7 +5,7 @@ coarse bound about small parts of the scene.
 """
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
@@ -20,6 +20,7 @@ from guided_lgp.logic import (
     Action,
     Objective,
     Skeleton,
+    State,
     applicable_actions,
     format_skeleton,
     successor,
@@ -288,7 +289,7 @@ class TaskFacts:
         """The grippers that can take a body and put it on a support, alone with its stack."""
         found = []
         for taking in self._takings(body):
-            after = successor(self._state, taking)
+            after = successor(self._hands_empty, taking)
             for action in applicable_actions(after, self._symbols):
                 one = self._symbols.domain.bind(action)
                 if (one.body, one.parent, one.actor) == (body, support, taking.symbols[0]):
@@ -355,10 +356,15 @@ class TaskFacts:
         return "fingers" if max(nearest) < _FINGERS else "hands"
 
     def _takings(self, body: str) -> list[Action]:
-        """The ways to take a body at the start."""
+        """The ways to take a body at the start, by a hand that may be full until then, too."""
         bind = self._symbols.domain.bind
-        every = applicable_actions(self._state, self._symbols)
+        every = applicable_actions(self._hands_empty, self._symbols)
         return [a for a in every if bind(a).body == body and bind(a).into_hand]
+
+    @cached_property
+    def _hands_empty(self) -> State:
+        """The state at the start without what is in a hand."""
+        return replace(self._state, held=())
 
     def _alone(self, skeleton: tuple[Action, ...]) -> bool:
         body = self._symbols.domain.bind(skeleton[-1]).body
