@@ -5,10 +5,12 @@ VENV := .venv
 BIN := $(CURDIR)/$(VENV)/bin
 INSTALLED := $(VENV)/.installed
 
+SHELF := .cache/shelf
+
 export PATH := $(BIN):$(PATH)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: setup ship quick repro study cases test lint bench open-world mlflow verify-determinism verify-interruption verify-load verify-hostile verify-execution sources reach
+.PHONY: setup ship quick repro study cases test lint bench open-world shelf mlflow verify-determinism verify-interruption verify-load verify-hostile verify-execution sources reach
 
 setup: $(INSTALLED)
 
@@ -72,6 +74,15 @@ bench: setup
 # 300 generated scenes of ten kinds, with and without a plan, whose truth is known: minutes.
 open-world: setup
 	python benchmarks/open_world.py
+
+# The shelf task of guided-tamp-benchmark, judged by that package in an environment of its own.
+shelf: setup $(SHELF)/.installed
+	python benchmarks/shelf.py
+
+$(SHELF)/.installed: benchmarks/shelf.txt
+	$(PYTHON) -m venv $(SHELF)
+	$(SHELF)/bin/pip install -qq --no-deps -r benchmarks/shelf.txt
+	touch $@
 
 # Random sequences with the other robots and with hand-overs, planned and carried out.
 reach: setup
