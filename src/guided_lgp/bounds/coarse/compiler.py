@@ -6,7 +6,6 @@ nothing symbolic has to be built where the library is there already.
 
 import ctypes
 import json
-import pickle
 from collections.abc import Iterator
 from dataclasses import astuple, fields
 from functools import cache
@@ -15,6 +14,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 import casadi as ca
+import numpy as np
 
 from guided_lgp.bounds.program.inverse import INPUTS, closed_forms
 from guided_lgp.bounds.program.kernels import KernelShape, KernelTable
@@ -63,7 +63,8 @@ def _key(robot: Robot) -> str:
     lengths = [(c.human_like and astuple(c.human_like)) for c in kinematics.chains]
     chains = [astuple(chain) for chain in kinematics.chains]
     content = (version("casadi"), kinematics.fixed, arms, lengths, chains)
-    return sha256(pickle.dumps(content, protocol=4) + b"".join(_sources())).hexdigest()
+    text = json.dumps(content, default=np.ndarray.tolist)
+    return sha256(text.encode() + b"".join(_sources())).hexdigest()
 
 
 def _sources() -> Iterator[bytes]:
