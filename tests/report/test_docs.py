@@ -39,7 +39,11 @@ def test_commands_and_options_exist(page: Path) -> None:
                 assert words[1] in targets, line
             if words[:1] == ["guided-lgp"] and not words[1].startswith("-"):
                 command = group.commands[words[1]]
-                options = {name for parameter in command.params for name in parameter.opts}
+                options = {
+                    name
+                    for parameter in command.params
+                    for name in (*parameter.opts, *parameter.secondary_opts)
+                }
                 used = {word.split("=")[0] for word in words[2:] if word.startswith("--")}
                 assert used <= options, line
             if words[:1] == ["python"]:
