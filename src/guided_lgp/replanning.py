@@ -198,11 +198,7 @@ class Laboratory(Execution):
     def drop(self, gripper: str, seconds: float = 1.0) -> None:
         """Let a hand lose what it holds."""
         for holder, box in [held for held in self._held if held[0] == gripper]:
-            constraint, _ = self._held.pop((holder, box))
-            if constraint is None:
-                self._simulation.relax(gripper)
-            else:
-                self._simulation.free(constraint)
+            self._release(holder, box)
         self._simulation.rest(seconds)
 
 

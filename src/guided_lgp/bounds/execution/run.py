@@ -39,8 +39,6 @@ PLACE_SLACK = 0.005
 """How far (m, rad) a box may be off the place that a goal asks for: as it settles."""
 HELD_SLACK = 0.02
 """How far (m) a held box may have slipped in the hand at the end."""
-_HOME = 1e-4
-"""rad: arms are at their side within it."""
 
 
 @dataclass(frozen=True)
@@ -118,16 +116,13 @@ class Execution:
     ) -> None:
         self._world.close()
 
-    def carry_out(
-        self, scene: Scene, skeleton: Skeleton, trajectory: Trajectory, actions: int | None = None
-    ) -> str:
-        """Carry out a plan, or its first actions, from where the world is now.
+    def carry_out(self, scene: Scene, skeleton: Skeleton, trajectory: Trajectory) -> str:
+        """Carry out a plan from where the world is now.
 
         Args:
             scene: that the plan starts from.
             skeleton: its actions.
             trajectory: its motion.
-            actions: how many of them; the arms are at their side after the last one.
 
         Returns:
             What went wrong; empty if nothing did.
@@ -150,13 +145,11 @@ class Execution:
                     return fault
         self._simulation.rest(SETTLE_S)
         self._seen = self.boxes()
-        until = _end(scene, rows, trajectory, actions)
         for row, event in self._events(scene.state, skeleton, rows, trajectory):
-            if row <= until:
-                self._simulation.follow(float(trajectory.times[row]))
-                if fault := event():
-                    return fault
-        self._simulation.follow(float(trajectory.times[until]))
+            self._simulation.follow(float(trajectory.times[row]))
+            if fault := event():
+                return fault
+        self._simulation.follow(float(trajectory.times[-1]))
         self._simulation.rest(SETTLE_S)
         return ""
 
@@ -255,14 +248,18 @@ class Execution:
 
     def _let_go(self, gripper: str, box: str, after: State) -> str:
         """The fingers begin to open; a fault if the box is above what it should stand on."""
+        self._release(gripper, box)
+        support = after.support_of(box)
+        high = support is not None and self._world.distance(box, support, 2 * DROP) > DROP
+        return f"stand {box} {support}" if high else ""
+
+    def _release(self, gripper: str, box: str) -> None:
+        """Nothing keeps the box in the hand any more."""
         constraint, _ = self._held.pop((gripper, box))
         if constraint is None:
             self._simulation.relax(gripper)
         else:
             self._simulation.free(constraint)
-        support = after.support_of(box)
-        high = support is not None and self._world.distance(box, support, 2 * DROP) > DROP
-        return f"stand {box} {support}" if high else ""
 
     def _leave(self, gripper: str, box: str) -> str:
         """The fingers are open: what touches the box from now on pushes it."""
@@ -314,23 +311,3 @@ def _require_fingers(scene: Scene) -> None:
     for gripper, arm in scene.robot.description.arms.items():
         if not arm.fingers.joints:
             raise InputError("grip", f"{gripper} has no fingers that press", "fixed")
-
-
-def _end(scene: Scene, rows: Sequence[int], trajectory: Trajectory, actions: int | None) -> int:
-    """The row at which the arms are at their side after some actions, or the last one.
-
-    Raises:
-        InputError: they go on to the next action without that.
-    """
-    if actions is None or actions >= len(rows):
-        return len(trajectory.times) - 1
-    if not actions:
-        return 0
-    names = scene.robot.description.joint_names
-    q = trajectory.q[:, [trajectory.joint_names.index(name) for name in names]]
-    home = np.abs(q - scene.robot.description.home).max(axis=1) < _HOME
-    at = [row for row in range(rows[actions - 1], rows[actions]) if home[row]]
-    if not at:
-        fault = f"the arms do not rest at their side after action {actions}"
-        raise InputError("plan", fault, "a plan in which they do")
-    return at[0]
