@@ -35,8 +35,8 @@ def misplaced(
     last = len(q) - 1
     for index, (action, row) in enumerate(zip(skeleton, switches, strict=True)):
         before, state = state, successor(state, action)
-        for _, gripper in sorted(set(before.held) - set(state.held)):
-            if state.holder(action.symbols[1]) is not None:
+        for box, gripper in sorted(set(before.held) - set(state.held)):
+            if state.holder(box) is not None:
                 continue  # handed over, not put down
             columns = [trajectory.joint_names.index(j) for j in scene.robot.description.joint_names]
             shift = np.random.default_rng([seed, index]).normal(0.0, noise, 2)
