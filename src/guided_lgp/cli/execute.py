@@ -2,12 +2,11 @@
 
 import json
 from dataclasses import asdict
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from guided_lgp.cli.terminal import AsJson, one_of, spinner
+from guided_lgp.cli.terminal import AsJson, PlanFile, one_of, spinner
 from guided_lgp.errors import InputError
 
 app = typer.Typer()
@@ -15,9 +14,7 @@ app = typer.Typer()
 
 @app.command()
 def execute(
-    plan_file: Annotated[
-        Path, typer.Argument(metavar="PLAN", help="A plan written by plan --out.")
-    ],
+    plan_file: PlanFile,
     grip: Annotated[
         str,
         typer.Option(

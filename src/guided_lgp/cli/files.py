@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from guided_lgp.cli.outputs import destinations
-from guided_lgp.cli.terminal import is_plan
+from guided_lgp.cli.terminal import PlanFile, is_plan
 from guided_lgp.documents import copy_whole, write_text
 from guided_lgp.errors import InputError
 from guided_lgp.paths import EXAMPLES
@@ -35,9 +35,7 @@ def examples(
 
 @app.command()
 def export(
-    plan_file: Annotated[
-        Path, typer.Argument(metavar="PLAN", help="A plan written by plan --out.")
-    ],
+    plan_file: PlanFile,
     out: Annotated[
         Path,
         typer.Argument(

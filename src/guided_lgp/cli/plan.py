@@ -11,7 +11,7 @@ import typer
 from guided_lgp import __version__
 from guided_lgp.cli.outputs import destinations
 from guided_lgp.cli.running import complain
-from guided_lgp.cli.terminal import AsJson, is_plan, one_of, seconds, show, spinner
+from guided_lgp.cli.terminal import AsJson, PlanningTime, is_plan, one_of, show, spinner
 from guided_lgp.documents import STANDARD_OUTPUT
 from guided_lgp.domains import domain_names
 from guided_lgp.errors import InputError
@@ -115,15 +115,7 @@ def plan(
             show_default="the limit in --params",
         ),
     ] = None,
-    timeout: Annotated[
-        float | None,
-        typer.Option(
-            parser=seconds,
-            metavar="SECONDS",
-            help="Give up after so many seconds.",
-            show_default="no limit of time",
-        ),
-    ] = None,
+    timeout: PlanningTime = None,
     out: Annotated[
         Path | None,
         typer.Option(

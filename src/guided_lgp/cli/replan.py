@@ -7,16 +7,14 @@ from typing import Annotated
 import typer
 
 from guided_lgp.cli.outputs import destinations
-from guided_lgp.cli.terminal import AsJson, seconds, show, spinner
+from guided_lgp.cli.terminal import AsJson, PlanFile, PlanningTime, show, spinner
 
 app = typer.Typer()
 
 
 @app.command()
 def replan(
-    plan_file: Annotated[
-        Path, typer.Argument(metavar="PLAN", help="A plan written by plan --out.")
-    ],
+    plan_file: PlanFile,
     observed: Annotated[
         Path,
         typer.Option(
@@ -32,15 +30,7 @@ def replan(
             show_default="0: none yet",
         ),
     ] = 0,
-    timeout: Annotated[
-        float | None,
-        typer.Option(
-            parser=seconds,
-            metavar="SECONDS",
-            help="Give up after so many seconds.",
-            show_default="no limit of time",
-        ),
-    ] = None,
+    timeout: PlanningTime = None,
     out: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Write the plan from here on.", show_default="no file"),

@@ -51,6 +51,19 @@ TimeLimit = Annotated[
 ]
 
 
+PlanFile = Annotated[Path, typer.Argument(metavar="PLAN", help="A plan written by plan --out.")]
+PlanningTime = Annotated[
+    float | None,
+    typer.Option(
+        "--timeout",
+        parser=seconds,
+        metavar="SECONDS",
+        help="Give up after so many seconds.",
+        show_default="no limit of time",
+    ),
+]
+
+
 def one_of(names: Collection[str]) -> Callable[[str], str]:
     """A parser of an option that accepts some names only."""
 
