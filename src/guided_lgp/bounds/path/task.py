@@ -22,6 +22,10 @@ from guided_lgp.scene import Scene
 _SHIFTS = (0.0, 0.25, -0.25, 0.5, -0.5)
 """Turns of the redundant joint (rad) on the straight way off a box that are tried."""
 
+_KEPT = 16
+"""How many inverse kinematics are kept of contacts asked for last, a few MB each: to keep all takes
+half a GB in some searches and saves no time in any of 109."""
+
 _Key = tuple[str | bytes, ...]
 
 Choice = tuple[int, int, int]
@@ -196,9 +200,11 @@ class Task:
         values = np.append(arm.redundancies, coarse)
         arrays = (values, rotation, contact, way)
         key: _Key = (arm.gripper, *(array.tobytes() for array in arrays))
-        if key not in self._kept:
-            self._kept[key] = self._solved(arm, rotation, contact, way, values)
-        return self._kept[key]
+        found = self._kept.pop(key, None) or self._solved(arm, rotation, contact, way, values)
+        self._kept[key] = found  # now the last one
+        if len(self._kept) > _KEPT:
+            del self._kept[next(iter(self._kept))]
+        return found
 
     @staticmethod
     def _solved(
