@@ -82,8 +82,7 @@ def _sample(length: int, number: int) -> Sample | None:
 
 
 def _waiting(robot: Robot, trajectory: Trajectory) -> float:
-    columns = [trajectory.joint_names.index(name) for name in robot.joint_names]
-    still = ~np.any(np.diff(trajectory.q[:, columns], axis=0), axis=1)
+    still = ~np.any(np.diff(trajectory.joints(robot.joint_names), axis=0), axis=1)
     return float(np.diff(trajectory.times)[still].sum() / trajectory.times[-1])
 
 

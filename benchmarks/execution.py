@@ -152,8 +152,7 @@ def carried_out(task: Task) -> dict[str, Any] | None:
 
 
 def _moving(found: Course) -> Array:
-    names = found.scene.robot.description.moving_joints
-    return found.trajectory.q[:, [found.trajectory.joint_names.index(name) for name in names]]
+    return found.trajectory.joints(found.scene.robot.description.moving_joints)
 
 
 def waiting(found: Course, q: Array) -> float:

@@ -217,7 +217,7 @@ def samples(task: Task, scene: Scene, trajectory: Trajectory) -> tuple[Array, Ar
 
     The fingers, about which its tasks say nothing on the way, are closed at start and end.
     """
-    joints = trajectory.q[:, [trajectory.joint_names.index(name) for name in _JOINTS]]
+    joints = trajectory.joints(_JOINTS)
     rows = _rows(scene, trajectory, joints)
     dense = _between(joints, rows)
     poses = _body_poses(task, scene, trajectory, rows, dense[:, :_ARM])

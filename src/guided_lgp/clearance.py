@@ -53,7 +53,7 @@ def clearance_of(scene: Scene, skeleton: Skeleton, trajectory: Trajectory) -> Cl
     if not isinstance(rows, list):
         raise ValueError(f"the motion is not that of the actions: {rows.constraint}")
     robot, world, nearest = scene.robot.description, world_of(scene), Clearance(FARTHEST)
-    q = trajectory.q[:, [trajectory.joint_names.index(name) for name in robot.moving_joints]]
+    q = trajectory.joints(robot.moving_joints)
     states = [scene.state]
     for action in skeleton:
         states.append(successor(states[-1], action))

@@ -282,8 +282,7 @@ def first_actions(course: Course) -> Course:
 def _away(course: Course, rows: Sequence[int], count: int) -> int | None:
     """The first row after an action at which no hand is where it acted, or will act next."""
     robot, trajectory = course.scene.robot.description, course.trajectory
-    columns = [trajectory.joint_names.index(name) for name in robot.joint_names]
-    tools = course.scene.robot.tool_poses(trajectory.q[:, columns])
+    tools = course.scene.robot.tool_poses(trajectory.joints(robot.joint_names))
     first, last = rows[count - 1], rows[count]
     away = np.ones(last - first, bool)
     for gripper, poses in tools.items():

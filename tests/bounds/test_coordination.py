@@ -68,8 +68,7 @@ def test_no_row_is_outside_any_limit(apart: tuple[Scene, PathResult], together: 
     scene, trajectory = apart[0], motion(together)
     switches = switches_of(scene, together.skeleton, trajectory)
     assert isinstance(switches, list)
-    columns = [trajectory.joint_names.index(name) for name in PR2.moving_joints]
-    q = trajectory.q[:, columns]
+    q = trajectory.joints(PR2.moving_joints)
     outside = rows_outside_limits(scene, together.skeleton, switches, q, trajectory.times)
     assert "jerk" in outside
     assert set(outside.values()) == {0}

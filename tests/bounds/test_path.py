@@ -64,7 +64,7 @@ def test_arms_return_home_and_fingers_open_and_close(bound: PathBound, coarse: C
     for row in (trajectory.q[0], trajectory.q[-1]):
         assert row[:14] == pytest.approx(SCENE.robot.description.home)
     (attachment,) = trajectory.attachments
-    finger = trajectory.q[:, trajectory.joint_names.index("r_gripper_l_finger_joint")]
+    finger = trajectory.joints(["r_gripper_l_finger_joint"])[:, 0]
     assert finger[: attachment.start].max() > finger[attachment.start]
     assert finger[attachment.end :].max() > finger[attachment.end]
     assert np.ptp(finger[attachment.start : attachment.end + 1]) == 0.0

@@ -6,7 +6,7 @@ of ``Robot.joint_names`` (rad). Poses are arrays
 its origin on the floor under the robot's base.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -84,6 +84,10 @@ class Trajectory:
     q: Array
     """(T, len(joint_names)) rad, m for prismatic joints."""
     attachments: tuple[Attachment, ...]
+
+    def joints(self, names: Sequence[str]) -> Array:
+        """The values (T, len(names)) of some joints, in the order of their names."""
+        return self.q[:, [self.joint_names.index(name) for name in names]]
 
 
 @dataclass(frozen=True)

@@ -222,8 +222,7 @@ def _commands(
     for gripper, arm in robot.arms.items():
         if not arm.fingers.joints:
             continue
-        column = trajectory.joint_names.index(arm.fingers.joints[0])
-        values = trajectory.q[:, column] / arm.fingers.ratios[0]
+        values = trajectory.joints(arm.fingers.joints[:1])[:, 0] / arm.fingers.ratios[0]
         for leg in legs:
             for start, end in _runs(values, *leg):
                 yield GripperCommand(gripper, start, arm.fingers.opening(float(values[end])))

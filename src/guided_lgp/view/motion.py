@@ -57,8 +57,7 @@ def frames(scene: Scene, trajectory: Trajectory) -> list[Frame]:
         trajectory: the motion.
     """
     robot = scene.robot.description
-    columns = [trajectory.joint_names.index(name) for name in robot.joint_names]
-    tools = scene.robot.tool_poses(trajectory.q[:, columns])
+    tools = scene.robot.tool_poses(trajectory.joints(robot.joint_names))
     boxes = dict(initial_poses(scene))
     grasps: dict[int, Array] = {}
     shown = []

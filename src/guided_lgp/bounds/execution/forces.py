@@ -59,7 +59,7 @@ def grips_of(
         trajectory: the motion.
     """
     robot = scene.robot.description
-    q = trajectory.q[:, [trajectory.joint_names.index(name) for name in robot.moving_joints]]
+    q = trajectory.joints(robot.moving_joints)
     loads = carried_boxes(scene, skeleton, switches, q)
     tools = scene.robot.tool_poses(q[:, : len(robot.joint_names)])
     held = spans(scene.state, skeleton, switches, len(q), lambda state: dict(state.held))

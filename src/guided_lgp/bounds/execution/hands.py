@@ -75,5 +75,5 @@ def _moving(arm: Arm, trajectory: Trajectory, first: int, last: int) -> np.ndarr
     """For each interval between two rows, whether the fingers move; None where they cannot."""
     if not arm.fingers.joints:
         return None
-    column = trajectory.joint_names.index(arm.fingers.joints[0])
-    return np.asarray(np.diff(trajectory.q[first : last + 1, column]) != 0.0)
+    (values,) = trajectory.joints(arm.fingers.joints[:1])[first : last + 1].T
+    return np.asarray(np.diff(values) != 0.0)

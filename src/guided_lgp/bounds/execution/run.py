@@ -81,8 +81,7 @@ def execute(
 def final_boxes(scene: Scene, trajectory: Trajectory) -> dict[str, Array]:
     """Where a plan leaves every box: poses (7,), from the scene, the attachments and kinematics."""
     boxes = initial_poses(scene)
-    names = scene.robot.description.joint_names
-    arms = trajectory.q[:, [trajectory.joint_names.index(name) for name in names]]
+    arms = trajectory.joints(scene.robot.description.joint_names)
     for attachment in sorted(trajectory.attachments, key=lambda attachment: attachment.start):
         ends = arms[[attachment.start, attachment.end]]
         start, end = scene.robot.tool_poses(ends)[attachment.gripper]

@@ -48,9 +48,9 @@ class Simulation:
     def load(self, trajectory: Trajectory) -> None:
         """Get ready to follow a motion from its start."""
         moments = np.arange(int(np.ceil(trajectory.times[-1] * RATE)) + 1) / RATE
-        columns = [trajectory.joint_names.index(name) for name in self._robot.moving_joints]
+        values = trajectory.joints(self._robot.moving_joints)
         self._targets = np.stack(
-            [np.interp(moments, trajectory.times, trajectory.q[:, i]) for i in columns], axis=1
+            [np.interp(moments, trajectory.times, joint) for joint in values.T], axis=1
         )
         self._motors = self._efforts()
         self._step = 0

@@ -58,8 +58,7 @@ def verify_path(
     if isinstance(switches, Violation):
         return PathReport(switches)
     robot = world.scene.robot.description
-    columns = [trajectory.joint_names.index(name) for name in robot.moving_joints]
-    q = trajectory.q[:, columns]
+    q = trajectory.joints(robot.moving_joints)
     motion = (world.scene, skeleton, switches, q, trajectory.times)
     fault = limit_faults(*motion) or finger_faults(*motion)
     away = float(np.abs(q[0, : len(robot.joint_names)] - world.scene.robot.start).max())
