@@ -157,7 +157,7 @@ def test_lower_bounds(goals: list[str], length: int | None) -> None:
         (["(held-by a left)", "(held-by a right)"], "one place only"),
         (["(held-by a left)", "(held-by c left)"], "two things"),
         (["(held-by a left)", "(empty left)"], "two things, or one while it is empty"),
-        (["(held a)", "(empty left)", "(empty right)"], "1 boxes to hold"),
+        (["(held a)", "(empty left)", "(empty right)"], "1 box to hold"),
         (["(held desk)"], "unknown box 'desk'"),
         (["(opened a)"], r"is not a goal \(accepted: \(held box\), \(held-by box gripper\)"),
     ],

@@ -61,7 +61,7 @@ def test_they_are_none_of_the_objectives_that_are_drawn() -> None:
         (["(handempty red)"], "is not a goal"),
         (["(heldby red pr2L)", "(heldby green pr2L)"], "two things"),
         (["(heldby red pr2L)", "(empty pr2L)"], "two things"),
-        (["(held red)", "(handempty)"], "1 boxes to hold"),
+        (["(held red)", "(handempty)"], "1 box to hold"),
         (["(held red)", "(in red tab1 0 0 1 1)"], "one place only"),
         (["(at red tab1 0.5 0.3 0.65)"], "is not a goal"),
         (["(at red tab1 0.5 0.3 0.65 0 0.1 0.1 0.1)"], "is not a goal"),

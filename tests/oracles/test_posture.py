@@ -8,6 +8,7 @@ import pytest
 from plan_checker import check
 
 from guided_lgp import plan
+from guided_lgp.bounds.execution import execute
 from guided_lgp.bounds.goals import GoalTerms
 from guided_lgp.bounds.plan_file import read_plan, write_plan
 from guided_lgp.bounds.verify import verify_path
@@ -63,6 +64,17 @@ def test_verification_looks_at_it() -> None:
     assert fault is not None
     assert fault.constraint == "posture panda"
     assert fault.amount == pytest.approx(0.8, abs=1e-6)
+
+
+def test_its_execution_looks_at_the_joints() -> None:
+    result = planned(posture(ASIDE))
+    assert result.path is not None
+    assert result.path.trajectory is not None
+    aside, home = posture(ASIDE), posture(HOME)
+    objective = parse_objective([aside, home])
+    report = execute(SCENE, objective, result.skeleton, result.path.trajectory)
+    assert dict(report.goals) == {str(objective[0]): True, str(objective[1]): False}
+    assert not report.success
 
 
 def test_a_posture_inside_something_is_the_reason() -> None:

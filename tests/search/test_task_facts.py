@@ -143,6 +143,21 @@ def test_no_arm_is_longer_than_its_links() -> None:
     assert facts(scene, "(on red far)").before_search() is None, "a long handle"
 
 
+def with_grasps(goal: str, *grasps: tuple[float, ...]) -> Finding | None:
+    """What is known before a search of the near scene, its red box held in these ways alone."""
+    red = NEAR.boxes[0].model_copy(update={"grasps": grasps})
+    scene = NEAR.model_copy(update={"boxes": (red, *NEAR.boxes[1:])})
+    return facts(scene, goal).before_search()
+
+
+def test_given_grasps_may_be_out_of_reach() -> None:
+    (from_above, long_handle), turn = ((0.0, 0.0, 0.02), (0.0, 0.0, 1.3)), (0, 0.70711, 0, 0.70711)
+    red = NEAR.boxes[0].name
+    assert with_grasps(f"(held {red})", (*from_above, *turn)) is None
+    assert found(with_grasps(f"(held {red})", (*long_handle, *turn))).kind == "reach"
+    assert with_grasps(f"(held {red})", (*long_handle, *turn), (*from_above, *turn)) is None
+
+
 def test_full_hands_are_no_lack_of_reach() -> None:
     held = [
         {"name": name, "size": (0.15, 0.07, 0.1), "on": gripper}

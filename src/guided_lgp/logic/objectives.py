@@ -247,7 +247,8 @@ def _check_hands(objective: Objective, symbols: Symbols) -> None:
     held = [parents & hands for parents in wanted if parents <= frozenset(symbols.grippers)]
     if len(held) > len(hands):
         limit = f"at most {len(hands)}, one per gripper"
-        raise InputError("objective", f"{len(held)} boxes to hold", limit)
+        boxes = "1 box" if len(held) == 1 else f"{len(held)} boxes"
+        raise InputError("objective", f"{boxes} to hold", limit)
     named = [parents for parents in held if len(parents) == 1 < len(hands)]
     if len(set(named)) < len(named) or frozenset() in held:
         raise InputError("objective", "a gripper is to hold two things, or one while it is empty")

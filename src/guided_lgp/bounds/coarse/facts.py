@@ -19,6 +19,7 @@ from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.bounds.results import Array
 from guided_lgp.logic import Skeleton, successor
 from guided_lgp.logic.domain import GroundInstruction
+from guided_lgp.scene.tolerances import GRASP_ANGLE, GRASP_OFFSET
 
 
 @dataclass(frozen=True)
@@ -56,19 +57,15 @@ class Facts:
         return next((hold for hold in self._holds(skeleton) if self._known.get(hold)), None)
 
     def out_of_reach(self, hold: Hold) -> bool:
-        """Whether the arm cannot do it, collisions aside; boxes too wide for the fingers aside.
-
-        Of boxes whose grasps are given, nothing is known.
-        """
+        """Whether the arm cannot do it, collisions aside; boxes too wide for the fingers aside."""
         if hold not in self._known:
             limb = self._limbs[hold.gripper]
             sides = grasp_sides(self._geometry, hold.box, self._arms[hold.gripper].arm)
-            if self._geometry.is_round(hold.box):
+            if self._turns_freely(hold.box):
                 sides = sides[:1]  # turned all around in the region
             self._known[hold] = (
                 limb is not None
                 and bool(sides)
-                and sides[0].given is None
                 and all(limb.cannot(self._grasp(hold, side)) for side in sides)
             )
         return self._known[hold]
@@ -120,20 +117,25 @@ class Facts:
             state = successor(state, ground.action)
         return moved, bool(state.carried_by(body))
 
+    def _turns_freely(self, box: str) -> bool:
+        """Whether a box is held the same from all around."""
+        return self._geometry.is_round(box) and not self._geometry.movable[box].grasps
+
     def _grasp(self, hold: Hold, side: GraspSide) -> Grasp:
         """All grasps of the box there on one side, with every value of the arm's first joint."""
         half_height = self._geometry.bodies[hold.box].half[2]
-        along, up = side.half_length - INSET, half_height - INSET
-        low, high, height = self._region(hold)
         arm, limb = self._arms[hold.gripper], self._limbs[hold.gripper]
+        least, most, gap = _ranges(side, half_height, arm.chain.palm_front)
+        low, high, height = self._region(hold)
+        turn = np.array([0.0, 0.0, side.turn])
         assert limb is not None
         return Grasp(
-            low=np.array([*low[:2], low[2] + side.turn, 0.0, -along, -up, limb.limits[0, 0]]),
-            high=np.array([*high[:2], high[2] + side.turn, np.pi, along, up, limb.limits[0, 1]]),
+            low=np.array([*(low + turn), *least, limb.limits[0, 0]]),
+            high=np.array([*(high + turn), *most, limb.limits[0, 1]]),
             height=height,
             half_length=side.half_length,
             half_height=half_height,
-            palm=arm.chain.palm_front + PALM_GAP,
+            palm=arm.chain.palm_front + gap,
             ends=((0.0, 0.0), *((line.back, line.up) for line in hold.lines)),
         )
 
@@ -142,7 +144,7 @@ class Facts:
         x, y, yaw, z = self._geometry.poses[hold.support or hold.box]
         if hold.support is None:
             place, turned = np.array([x, y, yaw]), np.zeros(3)
-            turned[2] = np.pi / 2 if self._geometry.is_round(hold.box) else 0.0
+            turned[2] = np.pi / 2 if self._turns_freely(hold.box) else 0.0
             return place - turned, place + turned, z
         hx, hy, hz = self._geometry.bodies[hold.support].half
         cosine, sine = abs(np.cos(yaw)), abs(np.sin(yaw))
@@ -152,3 +154,19 @@ class Facts:
         half[2] = np.pi / 2  # turned by half a turn, the same grasps come from the box's other end
         centre = np.array([x, y, 0.0])
         return centre - half, centre + half, z + hz + own[2]
+
+
+def _ranges(side: GraspSide, half_height: float, palm_front: float) -> tuple[Array, Array, float]:
+    """Least and greatest pitch and place of the fingertips, along a side and up, of its grasps.
+
+    The last is the least distance of the palm from the box (m).
+    """
+    if side.given is None:
+        along, up = side.half_length - INSET, half_height - INSET
+        return np.array([0.0, -along, -up]), np.array([np.pi, along, up]), PALM_GAP
+    pitch, offset, depth = side.given
+    cp, sp = np.cos(pitch), np.sin(pitch)
+    behind = side.half_length * abs(cp) + half_height * sp + palm_front + depth
+    middle = np.array([pitch, -behind * cp - offset * sp, behind * sp - offset * cp])
+    off = np.array([GRASP_ANGLE, GRASP_OFFSET, GRASP_OFFSET])
+    return middle - off, middle + off, depth - GRASP_OFFSET

@@ -36,7 +36,7 @@ DEVIATIONS = 4.0
 UPRIGHT = 0.9
 """Least vertical part of the contact normals where a box stands on something."""
 PLACE_SLACK = 0.005
-"""How far (m, rad) a box may be off the place that a goal asks for: as it settles."""
+"""How far (m, rad) a box or an arm may be off what a goal asks for: as it settles."""
 HELD_SLACK = 0.02
 """How far (m) a held box may have slipped in the hand at the end."""
 
@@ -280,10 +280,16 @@ class Execution:
         return seen != atom.negated
 
     def _in_place(self, goal: Goal) -> bool:
-        """Whether a box is where a goal wants it, but for what settling may shift."""
+        """Whether boxes and arms are where a goal wants them, but for what settling may shift."""
         terms = GoalTerms.of((goal,), self._scene.symbols.domain)
-        faults = terms.faults(self._scene, self.boxes())
-        return all(fault.amount <= PLACE_SLACK for fault in faults)
+        away = [fault.amount for fault in terms.faults(self._scene, self.boxes())]
+        away += [self._away(gripper, end) for gripper, end in terms.ends.items()]
+        return all(amount <= PLACE_SLACK for amount in away)
+
+    def _away(self, gripper: str, end: Array) -> float:
+        """How far (rad) a joint of an arm is at most from where it should end, at joints (n,)."""
+        joints = self._simulation.joints()[self._robot.arms[gripper].slice]
+        return float(np.abs(joints - end).max())
 
     def _in_hand(self, gripper: str, box: str) -> bool:
         """Whether a gripper holds a box that has not slipped."""
