@@ -40,6 +40,20 @@ def test_a_long_line_is_near_the_time_optimum() -> None:
     assert np.diff(times).max() <= 1.1 * INTERVAL
 
 
+@pytest.mark.parametrize("where", [1, 15, -1])
+def test_points_that_nearly_coincide_cost_no_time(where: int) -> None:
+    path = _curved()
+    near = path[where] + 1e-5 * np.array([-1.0, 1, -1, 1, -1, 1, -1])
+    times, rows = time_path(np.insert(path, where, near, axis=0), ARM)
+    assert times[-1] == pytest.approx(time_path(path, ARM)[0][-1], rel=0.02)
+    assert rows[[0, -1]].tolist() == path[[0, -1]].tolist()
+
+
+def test_a_tiny_motion_still_arrives() -> None:
+    ends = np.stack([ARM.home, ARM.home + 1e-5])
+    assert time_path(ends, ARM)[1][[0, -1]].tolist() == ends.tolist()
+
+
 def test_no_motion_takes_no_time() -> None:
     times, rows = time_path(np.stack([ARM.home, ARM.home]), ARM)
     assert times.tolist() == [0.0]

@@ -16,6 +16,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from guided_lgp.bounds.path.spline import Cubic
 from guided_lgp.bounds.results import Array
@@ -28,6 +29,9 @@ _SHARE = 0.97
 """Share of the limits that is used, so that the rounded rows keep them too."""
 _GRID_STEP = 0.04
 """Distance (m of the arm's motion) of grid points."""
+_NEAR = 1e-4
+"""Distance (m of the arm's motion) up to which points of a path count as one: a spline through
+both would bend between them so sharply that the arm had to creep."""
 _SLOWEST = 1e-10
 """Squared path velocity (m^2/s^2) between the ends, at least: rounding must not bring a stop."""
 _STILL = 1e-10
@@ -44,11 +48,10 @@ def time_path(path: Array, arm: Arm) -> tuple[Array, Array]:
     Returns:
         times (T,) from 0 (s), and configurations (T, n).
     """
-    lengths = np.sum(np.abs(np.diff(path, axis=0)) * arm.metric, axis=1)
-    path = path[np.concatenate([[True], lengths > 1e-9])]
-    s = np.concatenate([[0.0], np.cumsum(lengths[lengths > 1e-9])])
+    path = path[_apart(_lengths(path, arm))]
     if len(path) == 1:
         return np.zeros(1), path
+    s = np.concatenate([[0.0], np.cumsum(_lengths(path, arm))])
     curve = Cubic(s, path)
     velocity, acceleration = _SHARE * arm.velocity_limits, _SHARE * arm.acceleration_limits
     grid = np.linspace(0.0, s[-1], max(10, int(s[-1] / _GRID_STEP)))
@@ -112,6 +115,20 @@ def fastest_in_numpy(
     for i in range(len(most) - 1):
         x[i + 1] = max(_SLOWEST, min(x[i + 1], (factor[i] * x[i] + offset[i]).min()))
     return x
+
+
+def _lengths(path: Array, arm: Arm) -> Array:
+    """How far (m) the arm moves between the configurations of a path: (m - 1,)."""
+    return np.asarray(np.sum(np.abs(np.diff(path, axis=0)) * arm.metric, axis=1))
+
+
+def _apart(lengths: Array) -> NDArray[np.bool_]:
+    """Which points of a path (m,) a spline goes through: of near ones one, but always both ends."""
+    apart = np.concatenate([[True], lengths > _NEAR])
+    if lengths.sum() > 1e-9:  # beyond rounding: it moves at all
+        apart[np.flatnonzero(apart)[-1]] = False
+        apart[[0, -1]] = True
+    return apart
 
 
 def _along(grid: Array, speeds: Array, moments: Array, times: Array) -> Array:
