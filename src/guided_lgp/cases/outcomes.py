@@ -3,21 +3,19 @@
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, model_validator
+from pydantic import Field, TypeAdapter, model_validator
 
 from guided_lgp.cases.policies import RIVALS
 from guided_lgp.documents import read_json
 from guided_lgp.errors import InputError
 from guided_lgp.faults import validated
 from guided_lgp.paths import REPORTS
+from guided_lgp.quantities import Count, Figures, Number
 
 Row = dict[str, Any]
-Count = Annotated[int, Field(ge=0, le=10**9)]
 
 
-class _Row(BaseModel):
-    model_config = ConfigDict(strict=True, extra="forbid")
-
+class _Row(Figures, extra="forbid"):
     scene: str
     planner: str
 
@@ -49,7 +47,7 @@ class _Outcome(_Row):
 class _Time(_Row):
     """How long it took (s)."""
 
-    time_s: Annotated[float, Field(ge=0, le=1e9)]
+    time_s: Number
 
 
 _OUTCOMES = TypeAdapter(Annotated[list[_Outcome], Field(min_length=1)])

@@ -4,27 +4,20 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter, model_validator
+from pydantic import AfterValidator, Field, TypeAdapter, model_validator
 
 from guided_lgp.documents import read_json
 from guided_lgp.errors import InputError
 from guided_lgp.experiments.problems import PROBLEMS
 from guided_lgp.faults import validated
 from guided_lgp.paths import METRICS
+from guided_lgp.quantities import Count, Figures, Number, Share
 from guided_lgp.search.planners import CASE_PLANNERS, TABLE_1, TABLE_3
 
 Metrics = Mapping[str, Any]
 
-Count = Annotated[int, Field(ge=0, le=10**12)]
-Number = Annotated[float, Field(ge=0, le=1e12)]
-Share = Annotated[float, Field(ge=0, le=1)]
 
-
-class _Figures(BaseModel):
-    model_config = ConfigDict(strict=True)
-
-
-class Shares(_Figures):
+class Shares(Figures):
     """Of problems, by outcome."""
 
     n: Count
@@ -38,7 +31,7 @@ class Shares(_Figures):
     shortest_without_path: Share
 
 
-class Sizes(_Figures):
+class Sizes(Figures):
     """What one planner did on one problem; a mean over nothing is None."""
 
     objectives: Count
@@ -61,7 +54,7 @@ class Sizes(_Figures):
         return self
 
 
-class Times(_Figures):
+class Times(Figures):
     """How long it took (s), and its memory."""
 
     time_mean_s: Number | None
@@ -73,7 +66,7 @@ class Times(_Figures):
     peak_rss_mb: Number
 
 
-class Fit(_Figures):
+class Fit(Figures):
     """How one sub-policy was trained with one choice of validation samples."""
 
     accuracy: Share
@@ -102,14 +95,14 @@ class Trained(Fit):
     by_configuration: Fit
 
 
-class Training(_Figures):
+class Training(Figures):
     """The report on the training of one network."""
 
     samples: Count
     sub_policies: Annotated[dict[str, Trained], Field(min_length=1)]
 
 
-class Bounds(_Figures):
+class Bounds(Figures):
     """Quality and speed of the bounds for one number of actions."""
 
     n: Count
@@ -122,13 +115,13 @@ class Bounds(_Figures):
     physics_success_share: Share | None = None
 
 
-class Draws(_Figures):
+class Draws(Figures):
     """One value per draw."""
 
     shortest: Annotated[list[Share], Field(min_length=1)]
 
 
-class CaseFigures(_Figures):
+class CaseFigures(Figures):
     """What one planner did on the problems of one size of a case."""
 
     scenes: Count
@@ -151,7 +144,7 @@ def _known(rival: str) -> str:
     return rival
 
 
-class CaseRatio(_Figures):
+class CaseRatio(Figures):
     """The policy's calls as a share of the best rival's, with an interval."""
 
     rival: Annotated[str, AfterValidator(_known)]

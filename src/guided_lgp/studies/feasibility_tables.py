@@ -4,11 +4,12 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
+from pydantic import Field, TypeAdapter
 
 from guided_lgp.documents import read_json
 from guided_lgp.errors import InputError
 from guided_lgp.faults import validated
+from guided_lgp.quantities import Count, Figures, Number, Share
 from guided_lgp.report.table import Table
 from guided_lgp.search.planners import PAPERS
 from guided_lgp.studies.cases import CLASSIFIER, PLANNERS, RESULTS
@@ -19,23 +20,16 @@ SEARCHES = {
     if planner.adapt
 }
 
-Figures = Mapping[str, float]
-Runs = Mapping[str, Mapping[str, Mapping[str, Figures]]]
+Run = Mapping[str, float]
+Runs = Mapping[str, Mapping[str, Mapping[str, Run]]]
 """Policy, search, without or with the classifier, figure."""
 
 
 _ORIGIN = "the output of studies/run.py feasibility"
 Item = TypeVar("Item")
-Count = Annotated[int, Field(ge=0, le=10**12)]
-Share = Annotated[float, Field(ge=0, le=1)]
-Seconds = Annotated[float, Field(ge=0, le=1e12)]
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(strict=True)
-
-
-class _Calls(_Part):
+class _Calls(Figures):
     """What one search did with one policy."""
 
     shortest: Share
@@ -44,15 +38,15 @@ class _Calls(_Part):
     infeasible_calls: Count
 
 
-class _Times(_Part):
+class _Times(Figures):
     """How long it took."""
 
-    coarse_s: Annotated[Seconds, Field(gt=0)]
-    infeasible_s: Seconds
-    policy_s: Seconds
+    coarse_s: Annotated[Number, Field(gt=0)]
+    infeasible_s: Number
+    policy_s: Number
 
 
-class _Bin(_Part):
+class _Bin(Figures):
     """Predicted and observed shares, from one probability on."""
 
     start: Annotated[Share, Field(alias="from")]
@@ -64,7 +58,7 @@ class _Bin(_Part):
 _Pair = Annotated[list[Item], Field(min_length=2, max_length=2)]
 
 
-class _Classifier(_Part):
+class _Classifier(Figures):
     """How far it can be trusted."""
 
     n: Count
@@ -75,12 +69,12 @@ class _Classifier(_Part):
     bins: list[_Bin]
 
 
-class _Figures(_Part):
+class _Study(Figures):
     classifier: _Classifier
     search: dict[str, dict[str, dict[str, _Calls]]]
 
 
-_FIGURES = TypeAdapter[Any](_Figures)
+_FIGURES = TypeAdapter[Any](_Study)
 _TIMES = TypeAdapter[Any](dict[str, dict[str, dict[str, _Times]]])
 
 
@@ -136,7 +130,7 @@ def verdict(times: Runs) -> str:
     )
 
 
-def _change(searches: Iterable[Mapping[str, Figures]]) -> float:
+def _change(searches: Iterable[Mapping[str, Run]]) -> float:
     """By which share the classifier changes the time of coarse NLPs and policy."""
     runs = list(searches)
     without, with_it = (
@@ -146,7 +140,7 @@ def _change(searches: Iterable[Mapping[str, Figures]]) -> float:
     return with_it / without - 1
 
 
-def _infeasible_share(runs: Iterable[Figures]) -> float:
+def _infeasible_share(runs: Iterable[Run]) -> float:
     pairs = [(run["infeasible_s"], run["coarse_s"]) for run in runs]
     return sum(infeasible for infeasible, _ in pairs) / sum(coarse for _, coarse in pairs)
 

@@ -7,11 +7,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
+from pydantic import Field, TypeAdapter
 
 from guided_lgp.documents import read_json, write_text
 from guided_lgp.errors import InputError
 from guided_lgp.faults import validated
+from guided_lgp.quantities import Count, Figures, Share
 from guided_lgp.report.table import Record, Table
 from guided_lgp.studies import cases
 from guided_lgp.studies.cases import OUTCOMES, RESULTS, StudyParams, StudyTable, load_study
@@ -21,18 +22,14 @@ PLANNERS = {key: key.replace("_", "-") for key in cases.PLANNERS}
 SHOWN = (("shortest", "all"), ("shortest", "unseen"), ("no_solution", "all"))
 """The figures in the formatted table, by outcome and subset; the CSV file has all."""
 
-Figures = Mapping[str, Mapping[str, Mapping[str, Mapping[str, Sequence[float]]]]]
+Values = Mapping[str, Mapping[str, Mapping[str, Mapping[str, Sequence[float]]]]]
 """Case, planner, subset, figure: one value per run."""
 
-Share = Annotated[float, Field(ge=0, le=1)]
 
-
-class _Runs(BaseModel):
+class _Runs(Figures):
     """Of one planner and set of objectives: one value per run."""
 
-    model_config = ConfigDict(strict=True)
-
-    n: Annotated[list[Annotated[int, Field(ge=0, le=10**9)]], Field(min_length=1)]
+    n: Annotated[list[Count], Field(min_length=1)]
     shortest: Annotated[list[Share], Field(min_length=1)]
     feasible: Annotated[list[Share], Field(min_length=1)]
     no_solution: Annotated[list[Share], Field(min_length=1)]
@@ -65,14 +62,14 @@ def render(root: Path) -> None:
     logger.info("studies: %s", root / RESULTS / "studies.md")
 
 
-def read_figures(root: Path, name: str, content: StudyTable) -> Figures:
+def read_figures(root: Path, name: str, content: StudyTable) -> Values:
     """The figures of all cases of a study.
 
     Raises:
         InputError: the file is missing or damaged, or lacks a case or planner.
     """
     path, remedy = root / RESULTS / f"{name}.json", "the output of studies/run.py evaluate"
-    figures: Figures = read_json(path, remedy)
+    figures: Values = read_json(path, remedy)
     validated(_FIGURES.validate_python, figures, str(path), remedy)
     for case in content.cases:
         if not PLANNERS.keys() <= figures.get(case, {}).keys():
@@ -80,7 +77,7 @@ def read_figures(root: Path, name: str, content: StudyTable) -> Figures:
     return figures
 
 
-def _table(name: str, content: StudyTable, figures: Figures, study: StudyParams) -> Table:
+def _table(name: str, content: StudyTable, figures: Values, study: StudyParams) -> Table:
     rows, records = [], []
     for case in content.cases:
         title = study.cases[case].title
