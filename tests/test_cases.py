@@ -9,6 +9,7 @@ from guided_lgp import plan
 from guided_lgp.errors import InputError
 from guided_lgp.logic import progress, satisfied
 from guided_lgp.logic.objectives import parse_objective
+from guided_lgp.poses import compose, inverse
 from guided_lgp.scene import load_scene
 
 CASES = Path(__file__).parent / "cases"
@@ -43,6 +44,9 @@ ELEVEN = [f"(on b{number} right)" for number in range(1, 12)]
         ("can_between_walls", ["(on can right)"], 2),
         # Small bodies are held by the fingertips.
         ("cubes_25mm", ["(on c1 c3)", "(on c2 c1)"], 4),
+        # A plate that juts out: fingers above and below it, where it is and where it goes.
+        ("plate_at_edge", ["(on plate right)"], 2),
+        ("plate_at_edge", ["(on plate post)"], 2),
         # The hand opens as far as the box asks, and goes between neighbours.
         ("sorting_10", [*RED, *GREEN], 20),
         # More actions than the paper's limit of depth.
@@ -79,6 +83,43 @@ def test_a_faulty_scene_is_refused_in_one_line(name: str, fault: str) -> None:
     with pytest.raises(InputError, match=fault) as error:
         plan(CASES / f"{name}.json", "(on red right)")
     assert len(str(error.value).splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("y", "yaw", "room"),
+    [(0.32, -0.65, 0.124), (0.29, 0.14, 0.127), (0.38, 0.14, 0.125), (0.26, 0.39, 0.127)],
+)
+def test_into_a_low_shelf_from_wherever_the_box_stands(y: float, yaw: float, room: float) -> None:
+    scene = load_scene(CASES / "into_low_shelf.json")
+    (red,), (left, board, lid) = scene.boxes, scene.tables
+    red = red.model_copy(update={"position": (0.5, y, 0.65), "yaw": yaw})
+    lid = lid.model_copy(update={"position": (*lid.position[:2], board.top[2] + room + 0.04)})
+    scene = scene.model_copy(update={"boxes": (red,), "tables": (left, board, lid)})
+    result = plan(scene, "(on red board)", timeout=300)
+    assert len(result.skeleton or ()) == 2, result.explanation
+
+
+def test_a_plate_with_nothing_free_below_is_too_wide() -> None:
+    scene = load_scene(CASES / "plate_at_edge.json")
+    (plate,) = scene.boxes
+    inside = plate.model_copy(update={"position": (0.54, 0.33, 0.61)})
+    result = plan(scene.model_copy(update={"boxes": (inside,)}), "(on plate right)")
+    assert (result.reason, result.coarse_calls) == ("impossible", 0)
+    assert result.explanation.startswith("plate is too wide for the fingers: 0.200 m")
+
+
+def test_a_plate_in_a_hand_is_put_down_again() -> None:
+    scene = load_scene(CASES / "plate_at_edge.json")
+    taken = plan(scene, "(on plate right)")
+    assert taken.path is not None
+    assert taken.path.trajectory is not None
+    gripper, _ = taken.skeleton[0].symbols
+    keyframe = taken.path.at_switch[0]
+    tool = scene.robot.tool_pose(keyframe.q, gripper)
+    grasp = tuple(compose(inverse(tool), keyframe.boxes["plate"]).tolist())
+    held = scene.boxes[0].model_copy(update={"on": gripper, "grasp": grasp})
+    result = plan(scene.model_copy(update={"boxes": (held,)}), "(on plate right)", timeout=300)
+    assert len(result.skeleton or ()) == 1, result.explanation
 
 
 def test_a_table_out_of_reach_is_named_before_any_search() -> None:

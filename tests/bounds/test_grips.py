@@ -45,7 +45,20 @@ def test_a_box_is_held_on_every_pair_of_sides_that_the_hand_takes(
     assert len(closing) == sum(side <= ARM.fingers.grasp_width for side in size[:2])
 
 
-@pytest.mark.parametrize("size", [(0.15, 0.07, 0.10), (0.05, 0.04, 0.07), (0.025, 0.025, 0.025)])
+def test_what_is_too_wide_on_all_sides_is_held_at_top_and_bottom() -> None:
+    grips = grips_of(box(0.2, 0.15, 0.02), ARM)
+    assert sorted(grips) == [0.02]
+    frames = [rotation for _, part in every(grips) for rotation in part.rotation]
+    assert {tuple(frame[:, 0].round().tolist()) for frame in frames} == {
+        *((1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0))
+    }
+    assert all(abs(frame[2, 1]) == pytest.approx(1.0) for frame in frames)
+
+
+SIZES = [(0.15, 0.07, 0.10), (0.05, 0.04, 0.07), (0.025, 0.025, 0.025), (0.2, 0.15, 0.02)]
+
+
+@pytest.mark.parametrize("size", SIZES)
 def test_verification_accepts_every_grip(size: tuple[float, float, float]) -> None:
     body = box(*size)
     placement = pose((0.0, 0.0, 0.0)).tolist()

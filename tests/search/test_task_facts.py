@@ -111,6 +111,15 @@ def test_a_full_hand_may_be_emptied_first() -> None:
     assert task.reachable_by("parcel", "farleft") == ("pr2L",)
 
 
+def test_a_body_in_a_hand_is_taken_already() -> None:
+    document = json.loads((ROOT / "tests" / "cases" / "handover_only.json").read_text())
+    document["boxes"] = [{"name": "parcel", "size": [0.15, 0.07, 0.1], "on": "pr2L"}]
+    task = facts(parse_scene(document, "held"), "(on parcel farright)")
+    assert task.graspable_by("parcel") == ("pr2L",)
+    assert task.reachable_by("parcel", "farleft") == ("pr2L",)
+    assert found(task.after_search()).kind == "way"
+
+
 def test_who_reaches_what() -> None:
     task = facts(FAR, "(on parcel farright)")
     assert task.before_search() is None

@@ -1,12 +1,14 @@
 """How a hand holds a body at the start, where the scene leaves it open."""
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 
 from guided_lgp.poses import inverse, multiply, pose
 from guided_lgp.robots import Arm
-from guided_lgp.scene.bodies import Box
+from guided_lgp.scene.bodies import Body, Box
+from guided_lgp.scene.footprints import footprint, inset
 from guided_lgp.scene.tolerances import GRASP_ANGLE, GRASP_OFFSET
 
 _PALM_GAP = 0.002
@@ -28,6 +30,23 @@ def grasp_axes(size: tuple[float, float, float], widest: float) -> tuple[int, ..
     """
     order = (0, 1) if size[0] < size[1] else (1, 0)
     return tuple(axis for axis in order if size[axis] <= widest)
+
+
+def is_held_flat(box: Box, bodies: Iterable[Body], widest: float) -> bool:
+    """Whether fingers may close on top and bottom of a box: no two upright sides are near enough.
+
+    Part of its underside is free at the start, since it juts out over what it stands on or is in a
+    hand already; nobody could take it from anywhere else.
+
+    Args:
+        box: which has no grasps of its own.
+        bodies: of the scene.
+        widest: side (m) that the hand can take.
+    """
+    if grasp_axes(box.size, widest) or box.size[2] > widest:
+        return False
+    below = next((body for body in bodies if body.name == box.on), None)
+    return below is None or inset(footprint(below), footprint(box)).min() < 0
 
 
 def grasp_at_start(box: Box, arm: Arm) -> tuple[float, ...]:

@@ -32,6 +32,7 @@ from guided_lgp.logic.objectives import parents_wanted_by
 from guided_lgp.robots import Robot
 from guided_lgp.scene.bodies import Body, Box, Table
 from guided_lgp.scene.footprints import footprint, gap, inner_radius, inset, seat
+from guided_lgp.scene.grasps import is_held_flat
 from guided_lgp.scene.tolerances import MARGIN
 from guided_lgp.search.conflicts import Conflicts
 from guided_lgp.search.lengths import too_far
@@ -148,7 +149,11 @@ class TaskFacts:
         """Why no arm can move a body from the furniture that it stands on."""
         narrowest = min(self._boxes[body].grasp_widths)
         widest = max(arm.fingers.grasp_width for arm in self._robot.arms.values())
-        if narrowest > widest:
+        flat = any(
+            is_held_flat(self._boxes[body], self.scene.bodies, arm.fingers.grasp_width)
+            for arm in self._robot.arms.values()
+        )
+        if narrowest > widest and not flat:
             yield Finding(
                 "width",
                 f"{body} is too wide for the fingers: {narrowest:.3f} m at its narrowest side",
@@ -281,20 +286,32 @@ class TaskFacts:
         return Finding("blocked", text, f"space between {body} and {several}")
 
     def graspable_by(self, body: str) -> tuple[str, ...]:
-        """The grippers that can take a body where it is at the start, alone with its stack."""
+        """The grippers that can take a body where it is at the start, alone with its stack.
+
+        Of a body in a hand, that one.
+        """
+        if (holder := self._state.holder(body)) is not None:
+            return (holder,)
         takings = self._takings(body)
         return tuple(action.symbols[0] for action in takings if self._alone((action,)))
 
     def reachable_by(self, body: str, support: str) -> tuple[str, ...]:
         """The grippers that can take a body and put it on a support, alone with its stack."""
         found = []
-        for taking in self._takings(body):
-            after = successor(self._hands_empty, taking)
+        for gripper, taking, after in self._held(body):
             for action in applicable_actions(after, self._symbols):
                 one = self._symbols.domain.bind(action)
-                if (one.body, one.parent, one.actor) == (body, support, taking.symbols[0]):
-                    found += [one.actor] if self._alone((taking, action)) else []
+                if (one.body, one.parent, one.actor) == (body, support, gripper):
+                    found += [gripper] if self._alone((*taking, action)) else []
         return tuple(found)
+
+    def _held(self, body: str) -> Iterator[tuple[str, Skeleton, State]]:
+        """Grippers that hold a body, what has been done for that, and the state then."""
+        holder = self._state.holder(body)
+        if holder is not None:
+            yield holder, (), replace(self._state, held=((body, holder),))
+        for taking in self._takings(body):
+            yield taking.symbols[0], (taking,), successor(self._hands_empty, taking)
 
     def _no_way(self, body: str, parents: Iterable[str]) -> Iterator[Finding]:
         """No single arm brings a body to any of some supports."""
@@ -358,6 +375,8 @@ class TaskFacts:
     def _takings(self, body: str) -> list[Action]:
         """The ways to take a body at the start, by a hand that may be full until then, too."""
         bind = self._symbols.domain.bind
+        if self._state.holder(body) is not None:
+            return []
         every = applicable_actions(self._hands_empty, self._symbols)
         return [a for a in every if bind(a).body == body and bind(a).into_hand]
 

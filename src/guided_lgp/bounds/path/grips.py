@@ -1,5 +1,6 @@
 """Ways to hold a box: fingers across one of its sides, approach between its two ends."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from itertools import product
@@ -69,11 +70,9 @@ def _given(box: Box, widest: float) -> dict[float, tuple[Grips, Grips]]:
 @cache
 def _grips(body: Convex, palm_front: float, widest: float) -> dict[float, tuple[Grips, Grips]]:
     found: dict[float, tuple[list[_Frame], list[_Frame]]] = {}
-    pitches = np.pi * np.arange(_PITCHES + 1) / _PITCHES
-    for across, pitch, shift in product(grasp_axes(body.size, widest), pitches, _SHIFTS):
+    for across, approach, shift in _approaches(body, widest):
         central, others = found.setdefault(body.size[across], ([], []))
-        along, closing = np.eye(3)[1 - across], np.eye(3)[across]
-        approach = np.cos(pitch) * along - np.sin(pitch) * np.array([0.0, 0.0, 1.0])
+        closing = np.eye(3)[across]
         third = np.cross(approach, closing)
         half, touched = np.array(body.half), np.array(body.side(across))
         if min(touched) <= INSET:
@@ -88,6 +87,20 @@ def _grips(body: Convex, palm_front: float, widest: float) -> dict[float, tuple[
         for central, others in found.values():
             others.extend(_all_around(central))
     return {width: (_stacked(one), _stacked(other)) for width, (one, other) in found.items()}
+
+
+def _approaches(body: Convex, widest: float) -> Iterator[tuple[int, Array, float]]:
+    """Axis that the fingers close along, approach of the hand (3,), and its shift (m).
+
+    Where no upright sides are near enough to each other: top and bottom, level from each end.
+    """
+    axes, down = grasp_axes(body.size, widest), np.array([0.0, 0.0, -1.0])
+    pitches = np.pi * np.arange(_PITCHES + 1) / _PITCHES
+    for across, pitch, shift in product(axes, pitches, _SHIFTS):
+        yield across, np.cos(pitch) * np.eye(3)[1 - across] + np.sin(pitch) * down, shift
+    if not axes and body.size[2] <= widest:
+        for along, sense in product(np.eye(3)[:2], (1.0, -1.0)):
+            yield 2, sense * along, 0.0
 
 
 _Frame = tuple[Array, Array]

@@ -46,7 +46,7 @@ class LevelBody:
 
 @dataclass(frozen=True)
 class GraspSide:
-    """A pair of upright sides of a box that fingers close on."""
+    """A pair of sides of a box that fingers close on: upright ones, or top and bottom."""
 
     turn: float
     """Of their length against the box's x axis (rad)."""
@@ -56,7 +56,10 @@ class GraspSide:
     touched: tuple[float, float]
     """Half extents (m) of what fingertips may touch, along the length and in height."""
     given: tuple[float, float, float] | None = None
-    """Pitch, offset and depth of the one grasp on it, where the scene gives the grasps."""
+    """Pitch, offset and depth of the one grasp on it, where these are not variables."""
+    flat: bool = False
+    """Whether it is top and bottom: the hand comes level, a quarter turn about its approach from
+    where its fingers would close on the upright sides along that length."""
 
 
 class SceneGeometry:

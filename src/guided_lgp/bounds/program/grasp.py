@@ -8,7 +8,7 @@ bound, path bound and verification: the palm is outside of it, by ``PALM_GAP`` o
 tool frame's origin, which is between the fingertips, is over its side, by ``INSET`` or more.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import product
 from typing import Any
@@ -20,8 +20,9 @@ from guided_lgp.bounds.program.geometry import GraspSide, SceneGeometry
 from guided_lgp.bounds.program.kernels import absolute
 from guided_lgp.bounds.program.slots import HeldBox
 from guided_lgp.bounds.results import Array
-from guided_lgp.poses import inverse, multiply, pose, rotation_matrix
+from guided_lgp.poses import compose, inverse, multiply, pose, rotation_matrix
 from guided_lgp.robots import Arm
+from guided_lgp.scene.grasps import is_held_flat
 from guided_lgp.scene.tolerances import GRASP_ANGLE, GRASP_OFFSET
 
 PALM_GAP = 0.002
@@ -32,6 +33,8 @@ is grasped from above only so. Fingertips reach 3 to 19 mm beyond that point and
 so at least 6 by 14 mm of them are on the box."""
 _SAME = 1e-4
 """Difference (m, or sine of half an angle) of poses that are one."""
+ROLL = rotation_matrix(np.array([np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)]))
+"""From the tool frame of a hand that closes on top and bottom to the one that pitch is said of."""
 Hand = tuple[float, float]
 """Offset of a hand and its depth (m)."""
 Grip = tuple[float, float, float]
@@ -42,7 +45,7 @@ def grasp_sides(geometry: SceneGeometry, box: str, arm: Arm) -> tuple[GraspSide,
     """The sides of a box that a hand can close on; one for each grasp, where these are given."""
     body, half_height = geometry.movable[box], geometry.bodies[box].half[2]
     if not body.grasps:
-        return geometry.grasp_sides(box, arm.fingers.grasp_width)
+        return _free_sides(geometry, box, arm)
     found = (
         read_grip(
             grasp, sides_of(geometry, box, arm, grasp), half_height, arm.palm_front, loosely=True
@@ -52,14 +55,34 @@ def grasp_sides(geometry: SceneGeometry, box: str, arm: Arm) -> tuple[GraspSide,
     return tuple(replace(side, given=grip) for side, grip in filter(None, found))
 
 
+def _free_sides(geometry: SceneGeometry, box: str, arm: Arm) -> tuple[GraspSide, ...]:
+    """Upright sides; where none are near enough to each other, top and bottom, if they may be."""
+    widest = arm.fingers.grasp_width
+    upright = geometry.grasp_sides(box, widest)
+    flat = not upright and is_held_flat(geometry.movable[box], geometry.scene.bodies, widest)
+    return tuple(_flat_sides(geometry.bodies[box].half, arm)) if flat else upright
+
+
+def _flat_sides(half: tuple[float, float, float], arm: Arm) -> Iterator[GraspSide]:
+    """Top and bottom, for a hand that comes from each end, deep or half as deep, either way up."""
+    hx, hy, hz = half
+    for quarter, pitch, share in product(range(4), (0.0, np.pi), (1.0, 0.5)):
+        length = hy if quarter % 2 else hx
+        fingers = -arm.palm_front - INSET
+        deepest = max(PALM_GAP, fingers + 2 * (INSET - length))
+        depth = share * deepest + (1 - share) * fingers
+        given = (pitch, 0.0, depth)
+        yield GraspSide(quarter * np.pi / 2, length, 2 * hz, (length, hz), given, flat=True)
+
+
 def sides_of(geometry: SceneGeometry, box: str, arm: Arm, grasp: Array) -> tuple[GraspSide, ...]:
     """The sides on which a grasp may close, a pose (7,) of the box in the tool frame.
 
     Of a cylinder that is the one that the fingers are at.
     """
-    sides = geometry.grasp_sides(box, arm.fingers.grasp_width)
     if not geometry.is_round(box):
-        return sides
+        return _free_sides(geometry, box, arm)
+    sides = geometry.grasp_sides(box, arm.fingers.grasp_width)
     x, y, _ = rotation_matrix(inverse(grasp)[3:])[:, 1]
     return tuple(replace(side, turn=float(np.arctan2(-x, y))) for side in sides[:1])
 
@@ -118,7 +141,8 @@ def tool_targets(
     contact = poses[:, None, [0, 1, 3]] - extent[:, None] * x_axis - offset * z_axis
     position = contact[:, :, None] - ends[:, :1] * x_axis[:, :, None]
     position[..., 2] += ends[:, 1]
-    return np.stack([x_axis, y_axis, z_axis], axis=-1)[:, :, None], position
+    rotation = np.stack([x_axis, y_axis, z_axis], axis=-1)[:, :, None]
+    return rotation @ ROLL.T if held.side.flat else rotation, position
 
 
 def in_tool(held: HeldBox, values: Array, palm_front: float) -> Array:
@@ -127,7 +151,8 @@ def in_tool(held: HeldBox, values: Array, palm_front: float) -> Array:
     extent = held.side.half_length * abs(np.cos(pitch)) + held.half_height * np.sin(pitch)
     level = np.array([0.0, -np.sin(pitch / 2), 0.0, np.cos(pitch / 2)])
     turned = multiply(level, pose((0, 0, 0), -held.side.turn)[3:])
-    return np.array([extent + palm_front + depth, 0.0, offset, *turned])
+    placement = np.array([extent + palm_front + depth, 0.0, offset, *turned])
+    return compose(_rolled(1), placement) if held.side.flat else placement
 
 
 def read_grip(
@@ -145,10 +170,18 @@ def read_grip(
     off, turned_off = (GRASP_OFFSET, GRASP_ANGLE / 2) if loosely else (_SAME, _SAME)
     for side, about in product(sides, (0.0, np.pi)):
         turned = replace(side, turn=side.turn + about)
-        x, y, z, w = multiply(grasp[3:], pose((0, 0, 0), turned.turn)[3:]).tolist()
+        seen = compose(_rolled(-1), grasp) if side.flat else grasp
+        x, y, z, w = multiply(seen[3:], pose((0, 0, 0), turned.turn)[3:]).tolist()
         pitch = float((2 * np.arctan2(-y, w) + np.pi / 2) % (2 * np.pi) - np.pi / 2)
-        across = max(abs(x), abs(z)) < turned_off and abs(grasp[1]) < off
+        across = max(abs(x), abs(z)) < turned_off and abs(seen[1]) < off
+        if side.flat:  # the hand comes level, and the body is in the middle between the fingers
+            across &= abs(np.sin(pitch)) < turned_off and abs(seen[2]) < off
         if across and -turned_off <= pitch <= np.pi + turned_off:
             extent = side.half_length * abs(np.cos(pitch)) + half_height * np.sin(pitch)
-            return turned, (pitch, float(grasp[2]), float(grasp[0] - extent - palm_front))
+            return turned, (pitch, float(seen[2]), float(grasp[0] - extent - palm_front))
     return None
+
+
+def _rolled(sense: int) -> Array:
+    """Pose (7,) of that quarter turn about the approach, or of the one back."""
+    return np.array([0.0, 0.0, 0.0, sense * np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)])

@@ -5,7 +5,7 @@ general inverse kinematics.
 """
 
 from collections.abc import Callable, Iterable
-from functools import cache
+from functools import cache, partial
 from typing import Any, Protocol
 
 import casadi as ca
@@ -64,7 +64,10 @@ class StartIk(Protocol):
 class ClosedForm:
     """By the formulas of a human-like arm, for several pans and both elbows."""
 
-    def __init__(self, arm: ArmKinematics, lifted: float, evaluate: Evaluate) -> None:
+    def __init__(
+        self, arm: ArmKinematics, lifted: float, evaluate: Evaluate, flat: Callable[[], StartIk]
+    ) -> None:
+        self._flat = flat
         self._chain = arm.chain.name
         self._evaluate = evaluate
         self._candidates = np.zeros((2 * len(_PANS), INPUTS))
@@ -77,6 +80,8 @@ class ClosedForm:
         self, held: HeldBox, hand: Hand, poses: Array, pitches: Array, ends: Array
     ) -> tuple[Array, Array]:
         """See :class:`StartIk`."""
+        if held.side.flat:  # the formulas are for fingers that close on upright sides
+            return self._flat()(held, hand, poses, pitches, ends)
         shape = (len(poses), len(pitches), len(ends), 2 * len(_PANS))
         arguments = np.empty((*shape, INPUTS))
         arguments[...] = self._candidates
@@ -155,12 +160,15 @@ def start_ik(
         evaluate: runs closed forms.
     """
     closed = closed_form_arms(kinematics)
-    return {
-        gripper: ClosedForm(arm, _lifted(arm.chain, fixed), evaluate)
-        if arm.chain.name in closed
-        else General(kinematics.robot, arm, fixed)
-        for gripper, arm in kinematics.arms.items()
-    }
+    found: dict[str, StartIk] = {}
+    for gripper, arm in kinematics.arms.items():
+        general = cache(partial(General, kinematics.robot, arm, fixed))
+        found[gripper] = (
+            ClosedForm(arm, _lifted(arm.chain, fixed), evaluate, general)
+            if arm.chain.name in closed
+            else general()
+        )
+    return found
 
 
 def _lifted(chain: Chain, fixed: tuple[float, ...]) -> float:

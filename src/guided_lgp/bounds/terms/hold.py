@@ -17,6 +17,7 @@ from guided_lgp.bounds.program.geometry import GraspSide
 from guided_lgp.bounds.program.grasp import (
     INSET,
     PALM_GAP,
+    ROLL,
     Grip,
     grasp_sides,
     read_grip,
@@ -37,9 +38,12 @@ from guided_lgp.errors import InputError
 from guided_lgp.poses import compose
 from guided_lgp.scene.tolerances import GRASP_ANGLE, GRASP_OFFSET, MARGIN
 
+_FLAT = "_flat"
+"""What the names of kernels end with where fingers close on top and bottom."""
 
-def _kernel(chain: Chain, fixed: int) -> Kernel:
-    """Tool frame of the arm = target of the grasp.
+
+def _kernel(chain: Chain, fixed: int, flat: bool) -> Kernel:
+    """Tool frame of the arm, rolled where it is ``flat``, = target of the grasp.
 
     The orientation is written as the whole y axis and the whole direction of gravity, which vanish
     together at the target only.
@@ -49,26 +53,35 @@ def _kernel(chain: Chain, fixed: int) -> Kernel:
     q, grip, pose, z = x[:n], x[n : n + 3], x[n + 3 : n + 6], x[n + 6]
     side, scene, (z_offset, up) = p[0], p[1 : 1 + fixed], (p[1 + fixed], p[2 + fixed])
     arm = chain.pose(q, side, scene)
+    tool = ca.mtimes(arm.rotation, ca.sparsify(ca.SX(ROLL))) if flat else arm.rotation
     grasp = p[3 + fixed : 7 + fixed]
     position, rotation = tool_target(pose, z + z_offset + up, grip, grasp, chain.palm_front)
     c = ca.vertcat(
         SCALE * (arm.position - position),
-        arm.rotation[:, 1] - rotation[:, 1],
-        arm.rotation[2, 0] - rotation[2, 0],
-        arm.rotation[2, 2] - rotation[2, 2],
+        tool[:, 1] - rotation[:, 1],
+        tool[2, 0] - rotation[2, 0],
+        tool[2, 2] - rotation[2, 2],
     )
-    twist = ca.mtimes(rotation.T, arm.rotation)
+    twist = ca.mtimes(rotation.T, tool)
     # Rodrigues' vector of the rotation between the two: axis times tan(angle / 2)
     rodrigues = ca.vertcat(
         twist[2, 1] - twist[1, 2], twist[0, 2] - twist[2, 0], twist[1, 0] - twist[0, 1]
     ) / (1 + ca.trace(twist))
     return kernel(
-        f"hold_{chain.name}", x, p, c, True, lengths=3, independent=ca.vertcat(c[:3], rodrigues)
+        f"hold_{chain.name}{_FLAT * flat}",
+        x,
+        p,
+        c,
+        equality=True,
+        lengths=3,
+        independent=ca.vertcat(c[:3], rodrigues),
     )
 
 
 def _kernels(robot: RobotKinematics) -> tuple[Kernel, ...]:
-    return tuple(_kernel(chain, len(robot.fixed)) for chain in robot.chains)
+    return tuple(
+        _kernel(chain, len(robot.fixed), flat) for flat in (False, True) for chain in robot.chains
+    )
 
 
 def _add(context: Context, gripper: str, box: str) -> None:
@@ -187,7 +200,7 @@ def _rows(
     arm = context.robot.arms[held.gripper]
     grasp = (held.side.half_length, held.half_height, held.side.turn, back)
     context.rows(
-        f"hold_{arm.chain.name}",
+        f"hold_{arm.chain.name}{_FLAT * held.side.flat}",
         (*joints, *held.grip, *pose.plane, pose.z),
         (*context.arm_parameters(arm), pose.offset, up, *grasp),
         ("hold", held.gripper, held.box),
