@@ -77,6 +77,11 @@ class CoarseBound:
         self._settings = Settings()
         self._world = world or world_of(scene)
 
+    @property
+    def overhung(self) -> frozenset[str]:
+        """What may be stood on and is, in part, below something else."""
+        return self._geometry.overhung
+
     def solve(self, skeleton: Skeleton, prefix: CoarseResult | None = None) -> CoarseResult:
         """The verdict on a skeleton.
 

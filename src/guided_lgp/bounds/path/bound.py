@@ -95,6 +95,7 @@ class PathBound:
                 furthest,
                 number,
                 self._goals,
+                self._coarse.overhung,
             )
             limit = self._mover.queries + _QUERIES * (len(skeleton) + 4)
             gathered = task.gathered()

@@ -9,7 +9,7 @@ import numpy as np
 
 from guided_lgp.bounds.path.placements import alternatives, placed, placement_of
 from guided_lgp.bounds.path.situation import Situation
-from guided_lgp.bounds.path.steps import Way
+from guided_lgp.bounds.path.steps import LOW, Way
 from guided_lgp.bounds.path.task import Task
 from guided_lgp.bounds.results import Array
 from guided_lgp.poses import compose, inverse
@@ -53,7 +53,7 @@ class PlacementSampler:
         coarse = task.contacts[index].boxes
         support = task.top(action.parent, boxes)
         reference = placement_of(task.top(action.parent, coarse), coarse[action.body])
-        placements, ways = [reference], action.way_in.ways
+        placements, ways = [reference], self._ways(index)
         if strategy == "aside":
             ways = action.way_in.aside
         elif strategy == "elsewhere":
@@ -62,6 +62,12 @@ class PlacementSampler:
         poses = [placed(support, placement, half_height) for placement in placements]
         suitable = [pose for pose in poses if task.suits(index, pose, boxes)]
         return [Place(pose, way) for pose, way in product(suitable, ways)]
+
+    def _ways(self, index: int) -> tuple[Way, ...]:
+        """The ways in to a place; below something, a low one, too."""
+        task, action = self._task, self._task.manoeuvres[index]
+        below = task.root(index, action.parent) in task.overhung
+        return (*action.way_in.ways, LOW) if below else action.way_in.ways
 
     def _alternatives(
         self, index: int, situation: Situation, support: Array, reference: Array

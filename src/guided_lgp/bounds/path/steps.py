@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from guided_lgp.bounds.program.context import LOW
+from guided_lgp.bounds.program import context
 from guided_lgp.bounds.results import Array
 from guided_lgp.errors import InputError
 from guided_lgp.logic import Action, Domain, GroundInstruction, GroundTerm
@@ -54,7 +54,7 @@ _ASIDE = tuple(
 """Ways (m) up from a place past an arm that leans over it."""
 
 
-_LOW = Way(1.0, back=LOW[0], up=LOW[1])
+LOW = Way(1.0, back=context.LOW[0], up=context.LOW[1])
 """The way of a box out of and into where something is above it."""
 
 
@@ -141,7 +141,7 @@ def check_motions(domain: Domain) -> None:
 def _way_in(where: str, step: GroundTerm) -> Line:
     direction, length, otherwise = _direction(where, step)
     ways = [_straight(name, length) for name in (direction, otherwise) if name]
-    return Line(step.symbols[0], tuple(ways), (*_ASIDE, _LOW) if direction == "down" else ())
+    return Line(step.symbols[0], tuple(ways), (*_ASIDE, LOW) if direction == "down" else ())
 
 
 def _way_out(where: str, step: GroundTerm) -> Line:
@@ -151,7 +151,7 @@ def _way_out(where: str, step: GroundTerm) -> Line:
     direction, length, otherwise = _direction(where, step)
     ways = [_straight(direction, length)]
     if direction == "up":
-        ways += [Way(length, up=0.8, back=0.6), Way(0.5 * length, up=1.0), _LOW]
+        ways += [Way(length, up=0.8, back=0.6), Way(0.5 * length, up=1.0), LOW]
     if otherwise:
         ways += [Way(length, up=0.5, back=1.0), Way(_PAST, up=1.0)]
     return Line(step.symbols[0], tuple(ways))

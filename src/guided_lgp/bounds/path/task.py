@@ -1,6 +1,6 @@
 """What all ways to carry out the actions of a skeleton share, and the arm's reach at a contact."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from itertools import permutations
@@ -135,6 +135,7 @@ class Task:
         failure: FurthestFailure,
         seed: int,
         goals: GoalTerms,
+        overhung: Collection[str] = (),
     ) -> None:
         self.mover = mover
         self.arms = mover.arms
@@ -143,6 +144,8 @@ class Task:
         self.contacts = contacts
         self.failure = failure
         self.goals = goals
+        self.overhung = overhung
+        """What may be stood on and is, in part, below something else."""
         self.scene = scene
         self.rng = np.random.default_rng(np.random.SeedSequence([7, seed]))
         self.boxes = {box.name: box for box in scene.movable}
