@@ -193,6 +193,28 @@ def test_a_kept_file_is_mended_with_one_line(
     assert victim.read_bytes() == b"<mine/>"
 
 
+def test_mending_leaves_what_is_whole_or_being_made(folder: Path) -> None:
+    whole, file = (cache.kept(name, b"content") for name in ("whole", "file"))
+    file.write_bytes(b"half")
+    with cache._locked(file):
+        assert cache.damaged() == []
+        assert cache.mend() == []
+    assert cache.damaged() == [file]
+    assert cache.mend() == [file]
+    assert whole.exists()
+    assert not file.exists()
+
+
+def test_a_folder_for_a_lock_is_removed(folder: Path) -> None:
+    assert seven() == 7
+    file = library(folder)
+    file.unlink()  # this process has it open
+    lock = file.with_name(f"{file.name}.lock")
+    lock.unlink()
+    (lock / "a").mkdir(parents=True)
+    assert seven() == 7
+
+
 def test_the_checks_cost_little(folder: Path) -> None:
     assert seven() == 7
     start = time.process_time()

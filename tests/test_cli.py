@@ -398,9 +398,12 @@ def test_doctor_finds_a_damaged_cache_and_mends_it(
     assert not finding.ok
     assert str(file) in finding.detail
     assert finding.mend.endswith("doctor --repair")
-    assert len(doctor.repair()) == 1
+    (tmp_path / "guided-lgp" / "without a digest").touch()
+    whole = cache.kept("whole", b"content")
+    assert len(doctor.repair()) == 2
     assert doctor._cache().ok
-    assert not list(file.parent.iterdir())
+    assert not file.exists()
+    assert whole.read_bytes() == b"content"
     assert doctor.repair() == []
 
 

@@ -62,7 +62,7 @@ def kept(name: str, content: bytes) -> Path:
     """
     file = private_folder() / name
     if not is_whole(file) or _content(file) != content:
-        with _named_errors(file.parent):
+        with _named_errors(file.parent), _locked(file):
             _store(file, content)
     return file
 
@@ -80,7 +80,7 @@ def made(name: str, make: Callable[[Path], bytes | None]) -> Path | None:
     file = private_folder() / name
     if is_whole(file):
         return file
-    with _named_errors(file.parent), _alone(file):
+    with _named_errors(file.parent), _locked(file):
         if is_whole(file):  # made by the process that this one has waited for
             return file
         prefix = f"{_UNFINISHED}{name}-"
@@ -103,17 +103,33 @@ def is_whole(file: Path) -> bool:
 
 
 def damaged() -> list[Path]:
-    """Entries of the folder that are not what was written; they will be made again."""
-    entries = [file for file in private_folder().iterdir() if _digest_of(file).exists()]
-    return sorted(file for file in entries if not is_whole(file))
-
-
-def clear() -> None:
-    """Take everything out of the folder; it is made again when it is needed."""
+    """Entries of the folder that are not what was written, unless a process makes them just now."""
     folder = private_folder()
     with _named_errors(folder):
-        for entry in folder.iterdir():
-            remove(entry)
+        names = {entry.name.removesuffix(_DIGEST) for entry in folder.iterdir()}
+        found = sorted(folder / name for name in names if _is_entry(name))
+        return [file for file in found if not is_whole(file) and _nobody_makes(file)]
+
+
+def mend() -> list[Path]:
+    """Remove damaged entries, which are made again when they are needed.
+
+    Whole ones stay: other processes are about to open them.
+
+    Raises:
+        InputError: the folder cannot be used.
+    """
+    found = damaged()
+    for file in found:
+        with _named_errors(file.parent), _locked(file):
+            if not is_whole(file):  # another process has not been faster
+                remove(file)
+                remove(_digest_of(file))
+    return found
+
+
+def _is_entry(name: str) -> bool:
+    return not name.startswith(_UNFINISHED) and not name.endswith(_LOCK)
 
 
 def _digest_of(file: Path) -> Path:
@@ -154,22 +170,41 @@ def _put(file: Path, content: bytes) -> None:
 
 
 @contextmanager
-def _alone(file: Path) -> Iterator[None]:
+def _locked(file: Path) -> Iterator[None]:
     """Wait until no other process makes this file; the lock of one that dies ends with it.
 
     Where the file system has no locks, nobody waits and the last one's result stays.
     """
-    lock = file.with_name(f"{file.name}{_LOCK}")
-    if lock.is_symlink():
-        lock.unlink()
-    flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
-    descriptor = os.open(lock, flags, 0o600)
+    descriptor = _open_lock(file)
     try:
         with suppress(OSError):
             fcntl.flock(descriptor, fcntl.LOCK_EX)
         yield
     finally:
         os.close(descriptor)
+
+
+def _nobody_makes(file: Path) -> bool:
+    descriptor = _open_lock(file)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:  # a file system without locks
+        return True
+    finally:
+        os.close(descriptor)
+    return True
+
+
+def _open_lock(file: Path) -> int:
+    """The descriptor of the file that is locked; whatever else has its place is removed."""
+    lock = file.with_name(f"{file.name}{_LOCK}")
+    if lock.is_symlink() or lock.is_dir():
+        remove(lock)
+    return os.open(
+        lock, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o600
+    )
 
 
 @contextmanager

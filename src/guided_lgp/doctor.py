@@ -110,17 +110,17 @@ def _cache() -> Finding:
 
 
 def repair() -> list[str]:
-    """Mend what can be mended without the network: empty a damaged cache, which is made again.
+    """Mend what can be mended without the network: damaged entries of the cache.
 
     Returns:
         What was mended, one line each.
-    """
-    from guided_lgp.cache import clear
 
-    if _cache().mend != _REPAIR:
-        return []
-    clear()
-    return ["the cache was emptied; the next plan fills it again"]
+    Raises:
+        InputError: the cache cannot be used.
+    """
+    from guided_lgp.cache import mend
+
+    return [f"{file} was damaged; it is made again when it is needed" for file in mend()]
 
 
 def _policy(name: str) -> Finding:

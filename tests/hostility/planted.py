@@ -141,10 +141,10 @@ def pipe_for_a_library(place: Place) -> None:
 
 
 def folders_for_files(place: Place) -> None:
-    """Folders with something in them in place of library and digest."""
+    """Folders with something in them in place of library, digest and lock."""
     name = entry(place)
-    for file in (name, f"{name}.sha256"):
-        (place.cache / file).unlink()
+    for file in (name, f"{name}.sha256", f"{name}.lock"):
+        (place.cache / file).unlink(missing_ok=True)
         (place.cache / file / "a").mkdir(parents=True)
 
 

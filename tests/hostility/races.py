@@ -121,6 +121,22 @@ def compile_at_once(folder: Path, figures: Figures) -> None:
             figures.fault("lost", f"a library was not there: {said}")
 
 
+_REPAIR = "from guided_lgp.doctor import repair; repair()"
+
+
+def repair_at_once(folder: Path, figures: Figures) -> None:
+    """Two repairs of a damaged cache, while two processes want what is in it."""
+    variables = {"XDG_CACHE_HOME": str(folder)}
+    wanted, repair = ([sys.executable, "-c", code] for code in (_SEVEN, _REPAIR))
+    together([wanted], folder, **variables)
+    for library in (folder / "guided-lgp").glob("seven-*.so"):
+        library.write_bytes(b"no library")
+    for code, said in together([wanted, repair, repair, wanted], folder, **variables):
+        figures.runs += 1
+        if code != 0:
+            figures.fault("lost", f"a repair or what came with it ended with {code}: {said}")
+
+
 def run_stage_at_once(folder: Path, figures: Figures, processes: int) -> None:
     """Runs of one stage in one clone: one writes all files, the others wait or are refused."""
     roots = [folder / "alone", folder / "together"]
@@ -176,6 +192,7 @@ def all_races(folder: Path, figures: Figures) -> None:
         "writers": lambda at: write_at_once(at, figures, 1000),
         "plans": lambda at: plan_at_once(at, figures),
         **{f"compiled-{n}": lambda at: compile_at_once(at, figures) for n in range(5)},
+        **{f"repairs-{n}": lambda at: repair_at_once(at, figures) for n in range(5)},
         **{f"stages-{n}": lambda at, n=n: run_stage_at_once(at, figures, n) for n in (2, 3, 4)},
         **{f"mlflow-{n}": lambda at, n=n: record_at_once(at, figures, n) for n in (2, 3, 4)},
     }.items():
