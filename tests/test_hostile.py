@@ -26,6 +26,12 @@ def test_five_hundred_inputs_end_well(tmp_path: Path, monkeypatch: pytest.Monkey
     assert min(figures["accepted"], figures["refused"]) > 0
 
 
+def test_good_files_are_taken(tmp_path: Path) -> None:
+    """Else nobody would know whether a reader refuses what is wrong, or all there is."""
+    for reader in loaders(tmp_path):
+        reader.read(reader.folder)
+
+
 def unknown_name(number: int) -> object:
     return {}[number]
 

@@ -57,6 +57,22 @@ def test_streams_that_are_closed_get_no_file_in_their_place(tmp_path: Path) -> N
     assert found[0].actions == found[1].actions
 
 
+@pytest.mark.parametrize("command", ["plan", "view"])
+def test_a_pipe_is_read_once(command: str, tmp_path: Path) -> None:
+    """The second time, nobody would write."""
+    options = {"plan": "--goal '(on red green)' --planner breadth-first", "view": "--rerun a.rrd"}
+    program = shlex.join([sys.executable, "-m", "guided_lgp.cli", command])
+    words = f"{program} <(cat {shlex.quote(str(SCENE))}) {options[command]}"
+    done = subprocess.run(
+        ["bash", "-c", words], cwd=tmp_path, text=True, capture_output=True, check=False
+    )
+    fault = done.stderr.partition(": ")[2].partition(": ")[2]
+    assert (done.returncode, fault) in (
+        (0, ""),
+        (2, "has no motion to record (accepted: a plan written by plan --out)\n"),
+    )
+
+
 def test_a_full_disk_is_said_in_one_line(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from guided_lgp import tracking
+from guided_lgp import cli, tracking
 from guided_lgp.domains import load_domain
 from guided_lgp.errors import InputError
 from guided_lgp.mlflow_model import log_model
@@ -283,7 +283,7 @@ def test_killed_stages_are_marked_at_the_next_start(clone: Path) -> None:
     code = """
 import os, signal
 from pathlib import Path
-from guided_lgp import tracking
+from guided_lgp import cli, tracking
 from guided_lgp.params import load_params
 with tracking.recorded("generate_scenes", load_params(Path("params.yaml"))):
     os.kill(os.getpid(), signal.SIGKILL)
@@ -353,11 +353,24 @@ def test_a_database_that_goes_during_a_stage_is_one_line(
     assert len(line) <= 300
 
 
+@pytest.mark.parametrize("content", [b"no database" * 1000, b"SQLite format 3\0" + b"\xff" * 5000])
+@pytest.mark.parametrize("command", ["ui", "sync"])
+def test_a_damaged_database_is_one_line(
+    content: bytes, command: str, clone: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (clone / "mlflow.db").write_bytes(content)
+    with pytest.raises(SystemExit) as ended:
+        cli.main(["mlflow", command])
+    assert ended.value.code == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"error: {clone / 'mlflow.db'}: cannot be used: ")
+
+
 def test_of_two_that_make_the_database_both_are_recorded(clone: Path) -> None:
     (clone / "mlflow.db").unlink()
     code = """
 from pathlib import Path
-from guided_lgp import tracking
+from guided_lgp import cli, tracking
 from guided_lgp.params import load_params
 with tracking.recorded("generate_scenes", load_params(Path("params.yaml"))):
     pass

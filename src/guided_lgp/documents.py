@@ -33,6 +33,32 @@ _LEFTOVER_S = 60.0
 """Age of a leftover: a writer locks its file within microseconds."""
 
 
+def read_text(path: Path, accepted: str = "") -> str:
+    """Read a text in UTF-8, of which there may be no end: devices and pipes have none.
+
+    Args:
+        path: the file.
+        accepted: where such a file comes from, for the message.
+
+    Raises:
+        InputError: the file is missing, too large or not UTF-8.
+    """
+    where = str(path)
+    try:
+        with path.open("rb") as stream:
+            content = _beginning(stream)
+    except OSError as error:
+        raise InputError(where, error.strerror or "cannot be read", accepted) from None
+    except ValueError:  # a NUL, or half a pair of surrogates
+        raise InputError(where, "is no name of a file", accepted) from None
+    if len(content) > LARGEST:
+        raise InputError(where, f"is larger than {LARGEST // 2**20} MiB", accepted)
+    try:
+        return content.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise InputError(where, f"is not UTF-8 at byte {error.start}", accepted) from None
+
+
 def read_json(path: Path, accepted: str = "") -> Any:
     """Read a JSON document; numbers are finite, unlike those that :mod:`json` lets through.
 
@@ -43,16 +69,21 @@ def read_json(path: Path, accepted: str = "") -> Any:
     Raises:
         InputError: the file is missing, too large, not UTF-8 or not JSON.
     """
-    where = str(path)
+    return parse_json(read_text(path, accepted), str(path), accepted)
+
+
+def parse_json(text: str, where: str, accepted: str = "") -> Any:
+    """A JSON document in a text, as strictly.
+
+    Args:
+        text: the document.
+        where: its name, for the message.
+        accepted: where it comes from.
+
+    Raises:
+        InputError: it is none.
+    """
     try:
-        with path.open("rb") as stream:
-            content = _beginning(stream)
-    except OSError as error:
-        raise InputError(where, error.strerror or "cannot be read", accepted) from None
-    if len(content) > LARGEST:
-        raise InputError(where, f"is larger than {LARGEST // 2**20} MiB", accepted)
-    try:
-        text = content.decode("utf-8")
         document = json.loads(
             text,
             parse_float=_finite,
@@ -61,8 +92,6 @@ def read_json(path: Path, accepted: str = "") -> Any:
             object_pairs_hook=_without_duplicates,
         )
         return _in_unicode(document) if re.search(_SURROGATE, text) else document
-    except UnicodeDecodeError as error:
-        raise InputError(where, f"is not UTF-8 at byte {error.start}", accepted) from None
     except RecursionError:
         raise InputError(where, "is nested too deeply", accepted) from None
     except ValueError as error:
@@ -131,13 +160,11 @@ def read_yaml(path: Path, accepted: str = "") -> Any:
     Raises:
         InputError: the file is missing, not YAML, or has a key twice.
     """
-    where = str(path)
+    where, text = str(path), read_text(path, accepted)
     try:
-        document = _Loader(path.read_text(encoding="utf-8")).get_single_data()
+        document = _Loader(text).get_single_data()
         _require_an_end(document, frozenset(), set())
         return document
-    except OSError as error:
-        raise InputError(where, error.strerror or "cannot be read", accepted) from None
     except RecursionError:
         raise InputError(where, "is nested too deeply", accepted) from None
     except (yaml.YAMLError, ValueError, LookupError, AttributeError) as error:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from guided_lgp.documents import parse_json
 from guided_lgp.logic import applicable_actions, parse_objective
 from guided_lgp.policy.arrays import FloatArray
 from guided_lgp.policy.declaration import DeclaredPolicy
@@ -72,7 +73,7 @@ class FirstActions:
             InputError: a scene or a goal that cannot be read.
         """
         return [
-            json.dumps(self._first_actions(parse_scene(json.loads(scene), "scene"), goals))
+            json.dumps(self._first_actions(parse_scene(parse_json(scene, "scene"), "scene"), goals))
             for scene, goals in zip(inputs["scene"], inputs["goals"], strict=True)
         ]
 

@@ -7,11 +7,12 @@ from typing import Any
 
 import yaml
 
-from guided_lgp.documents import read_json, write_text, written_whole
+from guided_lgp.documents import write_text, written_whole
 from guided_lgp.params import Params, PlanningParams, load_params
 from guided_lgp.paths import METRICS, MODELS, PARAMS, PLANNING, TRAINED
 from guided_lgp.policy.declaration import PolicyDeclaration
 from guided_lgp.policy.registry import POLICIES, TRAINED_POLICIES
+from guided_lgp.report.metrics import GENERALIZATION, Metrics, read_metrics
 from guided_lgp.search.planners import TABLE_1
 
 CARD = "README.md"
@@ -31,7 +32,8 @@ def ship(root: Path, models: Path = MODELS, limits: Path = PLANNING) -> None:
         InputError: the parameters or metrics are missing or damaged, or a file cannot be written.
     """
     params = load_params(root / PARAMS)
-    metrics = read_json(root / METRICS / "generalization.json", "the output of the pipeline")
+    figures = root / METRICS / "generalization.json"
+    metrics = read_metrics(figures, "evaluate_generalization", GENERALIZATION)
     for name in _weights():  # cases have policies of their own beside these
         with written_whole(models / name) as unfinished:
             shutil.copyfile(root / TRAINED / name, unfinished)
@@ -48,7 +50,7 @@ def _weights() -> Iterator[Path]:
             yield Path(policy.folder, f"{network}.safetensors")
 
 
-def model_card(params: Params, metrics: dict[str, Any]) -> str:
+def model_card(params: Params, metrics: Metrics) -> str:
     """What the weights are for, what they were trained on, and how well they do, in Markdown.
 
     Args:

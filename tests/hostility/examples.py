@@ -1,20 +1,26 @@
 """Good files of every kind, to spoil."""
 
 import json
+import os
 import shutil
+from contextlib import AbstractContextManager
 from functools import cached_property
 from pathlib import Path
+from unittest.mock import patch
 
+import numpy as np
 import pyarrow as pa
 import yaml
 from outputs import write_outputs
 from own_robot import describe, document, written
 
+from guided_lgp import tracking
 from guided_lgp.bounds.plan_file import read_plan, write_plan
 from guided_lgp.cases.outcomes import outcomes_of, times_of
 from guided_lgp.cases.policies import RIVALS, demonstrations_of
 from guided_lgp.cases.shards import write_kept
 from guided_lgp.documents import read_json, write_json
+from guided_lgp.experiments import enumerate_sequences
 from guided_lgp.logic import (
     format_objective,
     parse_objective,
@@ -33,6 +39,7 @@ from guided_lgp.scene import Scene, generate, load_scene, load_scenes
 from guided_lgp.sequences import SHORTEST, VERDICTS
 from guided_lgp.studies.cases import RESULTS
 from guided_lgp.tables import write_table
+from stand_ins import NothingOnBlue
 
 ROOT = Path(__file__).parents[2]
 PARAMS = load_params(ROOT / "params.yaml")
@@ -82,11 +89,22 @@ class Examples:
         return folder
 
     @cached_property
+    def skeletons(self) -> Path:
+        """A scene, and what may begin a plan in it: text, a file for PDDL, a plan."""
+        folder = self._new("skeletons")
+        for name in ("three_boxes.json", "plan.json"):
+            shutil.copy(self.scenes / name, folder)
+        actions = read_plan(folder / "plan.json").actions
+        (folder / "text.txt").write_text(" ".join(actions))
+        (folder / "pddl.txt").write_text("; a plan\n" + "\n".join(actions).lower() + "\n")
+        return folder
+
+    @cached_property
     def parameters(self) -> Path:
-        """The parameters of the pipeline, of planning and of the studies."""
+        """The parameters of the pipeline, of planning and of the studies; its stages and lock."""
         folder = self._new("parameters")
         (folder / "studies").mkdir()
-        for name in ("params.yaml", "studies/params.yaml", "dvc.lock"):
+        for name in ("params.yaml", "studies/params.yaml", "dvc.yaml", "dvc.lock"):
             shutil.copy(ROOT / name, folder / name)
         params = yaml.safe_load((folder / "params.yaml").read_text())
         planning = {name: params[name] for name in ("bounds", "compare_scalability")}
@@ -156,6 +174,36 @@ class Examples:
         built(folder).save(folder / "dataset")
         return folder
 
+    @cached_property
+    def shard(self) -> Path:
+        """The enumeration of a scene in which nothing stands on blue."""
+        folder = self._new("shard")
+        write_shard_in(folder)
+        return folder
+
+    @cached_property
+    def tracked(self) -> Path:
+        """A database of MLflow."""
+        folder = self._new("tracked")
+        with in_database(folder):
+            tracking.prepare()
+        return folder
+
+
+def write_shard_in(folder: Path, seed: int = 1) -> Path:
+    """Enumerate a scene unless that has been done; the folder of the shard."""
+    (scene,) = generate("a", 1, seed, "x").scenes
+    params = load_params(ROOT / "tests" / "params.yaml")
+    task = enumerate_sequences.Task(scene, params.bounds, params.enumerate_sequences, "", folder)
+    with patch.object(enumerate_sequences, "SceneBounds", NothingOnBlue):
+        enumerate_sequences.write_shard(task)
+    return task.shard
+
+
+def in_database(folder: Path) -> AbstractContextManager[object]:
+    """Record runs in a folder."""
+    return patch.dict(os.environ, MLFLOW_TRACKING_URI=f"sqlite:///{folder / 'mlflow.db'}")
+
 
 def _after_an_action(file: Path) -> dict[str, object]:
     """What is observed after the first action of a plan, a grasp."""
@@ -186,8 +234,19 @@ def _write_whole_scene(folder: Path) -> None:
     corners = wedge.pop("vertices")
     lines = [f"v {x} {y} {z}" for x, y, z in corners] + ["f 1 2 3", "f 5 6 7"]
     (folder / "wedge.obj").write_text("\n".join(lines) + "\n")
-    wedge["mesh"] = "wedge.obj"
-    (folder / "whole.json").write_text(json.dumps(scene))
+    for name, mesh in {"whole.json": "wedge.obj", "surface.json": "wedge.stl"}.items():
+        wedge["mesh"] = mesh
+        (folder / name).write_text(json.dumps(scene))
+    (folder / "wedge.stl").write_bytes(_stl(corners))
+
+
+def _stl(corners: list[list[float]]) -> bytes:
+    """The lower and the upper face of a wedge, in binary STL."""
+    triangles = [[corners[n] for n in one] for one in ((0, 1, 2), (0, 2, 3), (4, 5, 6), (4, 6, 7))]
+    records = (
+        np.array([[0, 0, 1], *triangle], "<f4").tobytes() + b"\0\0" for triangle in triangles
+    )
+    return bytes(80) + len(triangles).to_bytes(4, "little") + b"".join(records)
 
 
 def _verdict(scene: Scene, box: str) -> dict[str, object]:

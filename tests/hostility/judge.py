@@ -1,5 +1,6 @@
 """What comes of an input: accepted, refused in one line, a foreign exception, or too slow."""
 
+import logging
 import multiprocessing
 import resource
 import signal
@@ -129,6 +130,7 @@ def _answers(receiver: Connection, pid: int) -> bool:
 def _judge_here(attempt: Try, numbers: list[int], sender: Connection) -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    logging.disable()  # of warnings, which would come a thousand times
     for number in numbers:
         sender.send(outcome_of(attempt, number))
     sender.close()

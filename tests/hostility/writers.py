@@ -12,17 +12,14 @@ from matplotlib.figure import Figure
 from guided_lgp import cache, compiled
 from guided_lgp.bounds.plan_file import Plan, read_plan
 from guided_lgp.documents import copy_whole, made_whole, write_json, write_text, written_whole
-from guided_lgp.experiments import enumerate_sequences
 from guided_lgp.export import export_plan
-from guided_lgp.params import load_params
 from guided_lgp.policy.tensors import write_tensors
 from guided_lgp.report.drawing import save
 from guided_lgp.scene import generate
 from guided_lgp.tables import write_table
 from guided_lgp.view.replay import replay_html
-from hostility.examples import ROOT, Examples
+from hostility.examples import ROOT, Examples, write_shard_in
 from hostility.kills import Writer
-from stand_ins import NothingOnBlue
 
 PARAMS = ROOT / "tests" / "params.yaml"
 
@@ -46,7 +43,7 @@ def writers(examples: Examples) -> tuple[Writer, ...]:
         Writer("cache", _in_cache(lambda n: cache.made(f"a{n}", lambda _: b"%d" % n * 5000))),
         Writer("compiled", _in_cache(_compiled)),
         Writer("folder", _folder),
-        Writer("shard", _shard),
+        Writer("shard", write_shard_in),
         Writer("bag", lambda at, n: _bag(plan, at / f"bag{n}")),
         Writer("weights", lambda at, n: copy_whole(weights[n], at / "models")),
     )
@@ -87,11 +84,3 @@ def _folder(at: Path, n: int) -> None:
             folder.mkdir()
             for name in "ab":
                 (folder / name).write_bytes(b"content" * 1000)
-
-
-def _shard(at: Path, n: int) -> None:
-    params = load_params(PARAMS)
-    (scene,) = generate("a", 1, n, "x").scenes
-    task = enumerate_sequences.Task(scene, params.bounds, params.enumerate_sequences, "", at)
-    with patch.object(enumerate_sequences, "SceneBounds", NothingOnBlue):
-        enumerate_sequences.write_shard(task)

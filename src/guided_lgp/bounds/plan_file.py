@@ -213,8 +213,20 @@ def read_plan(path: Path) -> Plan:
         InputError: the file is missing, is not JSON, or is not a plan; the message names the
             field and the fault.
     """
-    document = read_json(path, "a plan as written by guided-lgp plan --out")
-    return validated(Plan.model_validate, document, str(path))
+    return parse_plan(read_json(path, "a plan as written by guided-lgp plan --out"), str(path))
+
+
+def parse_plan(document: object, where: str) -> Plan:
+    """Validate the document of a plan.
+
+    Args:
+        document: what ``json.load`` returned.
+        where: the file, for the message.
+
+    Raises:
+        InputError: the first fault found, with file and field.
+    """
+    return validated(Plan.model_validate, document, where)
 
 
 def _rounded(grip: Grip) -> dict[str, object]:

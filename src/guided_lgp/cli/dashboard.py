@@ -28,7 +28,8 @@ def mlflow_ui(
     """
     from guided_lgp import tracking
 
-    experiment = tracking.prepare().get_experiment_by_name(tracking.EXPERIMENT)
+    with tracking.named_errors():
+        experiment = tracking.prepare().get_experiment_by_name(tracking.EXPERIMENT)
     address = f"http://127.0.0.1:{port}/#/experiments/{experiment.experiment_id}/runs"
     typer.echo(f"MLflow: {address} (Ctrl-C ends it)")
     command = [sys.executable, "-P", "-m", "mlflow", "server", "--host", "127.0.0.1"]
@@ -46,6 +47,7 @@ def mlflow_sync() -> None:
     from guided_lgp import tracking
     from guided_lgp.params import load_params
 
-    now, before = tracking.sync(load_params())
+    with tracking.named_errors():
+        now, before = tracking.sync(load_params())
     typer.echo(f"recorded {len(now)} stages {' '.join(now)}".strip())
     typer.echo(f"already recorded: {len(before)}")

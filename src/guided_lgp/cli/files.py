@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from guided_lgp.cli.outputs import destinations
-from guided_lgp.cli.terminal import PlanFile, is_plan
+from guided_lgp.cli.terminal import PlanFile, is_plan, read_scene_or_plan
 from guided_lgp.documents import copy_whole, write_text
 from guided_lgp.errors import InputError
 from guided_lgp.paths import EXAMPLES
@@ -146,13 +146,14 @@ def view(
 
     Example: guided-lgp view plan.json --rerun plan.rrd && rerun plan.rrd
     """
-    from guided_lgp.bounds.plan_file import read_plan
-    from guided_lgp.scene import load_scene
+    from guided_lgp.bounds.plan_file import parse_plan
+    from guided_lgp.scene import parse_scene
     from guided_lgp.scene.validate import validate_scene
 
     target = destinations({"--rerun": rerun}, [file])["--rerun"]
-    found = read_plan(file) if is_plan(file) else None
-    scene = found.scene if found else load_scene(file)
+    document = read_scene_or_plan(file)
+    found = parse_plan(document, str(file)) if is_plan(document) else None
+    scene = found.scene if found else parse_scene(document, str(file), file.parent)
     validate_scene(scene, str(file))
     if target is not None:
         if found is None:

@@ -11,7 +11,15 @@ import typer
 from guided_lgp import __version__
 from guided_lgp.cli.outputs import destinations
 from guided_lgp.cli.running import complain
-from guided_lgp.cli.terminal import AsJson, PlanningTime, is_plan, one_of, show, spinner
+from guided_lgp.cli.terminal import (
+    AsJson,
+    PlanningTime,
+    is_plan,
+    one_of,
+    read_scene_or_plan,
+    show,
+    spinner,
+)
 from guided_lgp.documents import STANDARD_OUTPUT
 from guided_lgp.domains import domain_names
 from guided_lgp.errors import InputError
@@ -171,17 +179,18 @@ def plan(
     from guided_lgp.logic import parse_objective
     from guided_lgp.params import load_planning
     from guided_lgp.planning import plan as search
-    from guided_lgp.scene import load_scene
+    from guided_lgp.scene import parse_scene
 
     files = destinations({"--out": out, "--html": html}, [scene, params, models])
     piped = STANDARD_OUTPUT in files.values()
     if piped and as_json:
         raise InputError("--json", "needs standard output, and so does a file named -")
-    if is_plan(scene):
+    document = read_scene_or_plan(scene)
+    if is_plan(document):
         raise InputError(
             str(scene), "is a plan, not a scene", "a scene; view and export take plans"
         )
-    start = load_scene(scene)
+    start = parse_scene(document, str(scene), scene.parent)
     objective = parse_objective(goal)
     with spinner("planning"):
         result = search(

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -103,11 +103,15 @@ def spinner(text: str) -> Iterator[None]:
         yield
 
 
-def is_plan(file: Path) -> bool:
-    """Whether a file is a plan; what is not is left to the reader of scenes.
+def read_scene_or_plan(file: Path) -> Any:
+    """The document in a file, which is read once: there may be nothing to read twice in a pipe.
 
     Raises:
         InputError: the file is missing or is not JSON.
     """
-    document = read_json(file, "a scene, or a plan written by plan --out")
+    return read_json(file, "a scene, or a plan written by plan --out")
+
+
+def is_plan(document: Any) -> bool:
+    """Whether a document is a plan; what is not is left to the reader of scenes."""
     return isinstance(document, dict) and "actions" in document

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from guided_lgp.documents import write_text
+from guided_lgp.documents import read_text, write_text
 from guided_lgp.errors import InputError
 from guided_lgp.paths import REPORTS
 from guided_lgp.report import paper
@@ -61,7 +61,7 @@ def _tables(root: Path) -> list[str]:
     for name in (*TABLES, *OPTIONAL):
         path = root / REPORTS / "tables" / f"{name}.md"
         if path.is_file():
-            texts.append(path.read_text(encoding="utf-8"))
+            texts.append(read_text(path))
         elif name in TABLES:
             raise InputError(str(path), "is missing", "the output of stage render_reports")
     return texts
@@ -69,7 +69,7 @@ def _tables(root: Path) -> list[str]:
 
 def _replace(readme: Path, block: str) -> None:
     """Put a block between the two markers of a page."""
-    before, begin, rest = readme.read_text(encoding="utf-8").partition(BEGIN)
+    before, begin, rest = read_text(readme).partition(BEGIN)
     _, end, after = rest.partition(END)
     if not end:
         raise InputError(str(readme), "has no markers of the findings", f"{BEGIN} and {END}")

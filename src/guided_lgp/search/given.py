@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from guided_lgp.documents import read_json
+from guided_lgp.documents import read_json, read_text
 from guided_lgp.errors import InputError
 from guided_lgp.logic import (
     Skeleton,
@@ -44,9 +44,4 @@ def _read(given: str, symbols: Symbols) -> Skeleton:
         if not isinstance(actions, list):
             raise InputError(f"{file}: actions", "are missing", "a plan, or one action a line")
         return parse_skeleton(" ".join(map(str, actions)))
-    try:
-        text = file.read_text(encoding="utf-8")
-    except (OSError, ValueError):  # the last: not in UTF-8, or a NUL in the name
-        accepted = "a file, or actions such as (grasp pr2L red)"
-        raise InputError(f"skeleton {given!r}", "is no file that can be read", accepted) from None
-    return read_plan(text, symbols)
+    return read_plan(read_text(file, "a file, or actions such as (grasp pr2L red)"), symbols)

@@ -4,11 +4,12 @@ import logging
 import os
 import platform
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 from guided_lgp.documents import unfinished_beside
+from guided_lgp.errors import InputError
 
 EXPERIMENT = "guided-lgp"
 SQLITE = "sqlite:///"
@@ -33,6 +34,27 @@ def repository() -> Path:
 def tracking_uri() -> str:
     """Where runs are recorded: ``MLFLOW_TRACKING_URI``, or the database of the clone."""
     return os.environ.get("MLFLOW_TRACKING_URI") or f"{SQLITE}{repository() / 'mlflow.db'}"
+
+
+@contextmanager
+def named_errors() -> Iterator[None]:
+    """Say what is wrong with the place where runs are recorded in one line.
+
+    Raises:
+        InputError: it cannot be reached, or is no database of MLflow, or a damaged one.
+    """
+    try:
+        yield
+    except Exception as error:
+        from mlflow import MlflowException  # after prepare() has said how it is imported
+        from sqlalchemy.exc import SQLAlchemyError
+
+        if not isinstance(error, (MlflowException, SQLAlchemyError, OSError)):
+            raise
+        uri = tracking_uri()
+        where = uri.removeprefix(SQLITE) if uri.startswith(SQLITE) else "$MLFLOW_TRACKING_URI"
+        fault = f"cannot be used: {' '.join(str(error).split())}"
+        raise InputError(where, fault, "a server or a database of MLflow") from error
 
 
 def prepare() -> Any:
