@@ -9,7 +9,17 @@ from guided_lgp.bounds.path import PathBound
 from guided_lgp.bounds.results import PathResult
 from guided_lgp.domains import pick_and_place as paper
 from guided_lgp.logic import Action, Domain
-from guided_lgp.logic.declarations import Instruction, attach, clear, free, holds, same, terms
+from guided_lgp.logic.declarations import (
+    Instruction,
+    attach,
+    carries,
+    clear,
+    free,
+    held,
+    holds,
+    same,
+    terms,
+)
 from guided_lgp.poses import compose, inverse
 from guided_lgp.scene import Scene
 
@@ -23,18 +33,19 @@ transit, line_in, switch, line_out, home = terms("transit line_in switch line_ou
 RAISE = Instruction(
     "raise",
     (g, b),
-    precondition=(free(g),),
+    precondition=(free(g), ~held(b)),
     effect=(attach(b, g),),
     contact=(pads(g, b), hold(g, b), beside(b)),
-    motion=(transit(g), line_in(g, back=0.12), switch(close=g), line_out(g, up=0.05)),
+    motion=(present(b), transit(g), line_in(g, back=0.12), switch(close=g), line_out(g, up=0.05)),
 )
 LOWER = Instruction(
     "lower",
     (g, b, t),
-    precondition=(holds(g, b),),
+    precondition=(holds(g, b), ~carries(b, t)),
     effect=(attach(b, t),),
-    contact=(stand(b, t), balanced(b, t), beside(b, t), hold(g, b)),
+    contact=(present(t), stand(b, t), balanced(b, t), beside(b, t), hold(g, b)),
     motion=(
+        present(t),
         transit(g),
         line_in(g, down=0.05),
         switch(open=g),

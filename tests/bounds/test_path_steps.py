@@ -5,7 +5,7 @@ from guided_lgp.bounds.path.steps import check_motions, manoeuvre
 from guided_lgp.domains import domain_names, load_domain
 from guided_lgp.errors import InputError
 from guided_lgp.logic import Action, Domain
-from guided_lgp.logic.declarations import Instruction, Term, Type, attach, free, terms
+from guided_lgp.logic.declarations import Instruction, Term, Type, attach, free, held, terms
 
 Gripper, Table = Type("gripper"), Type("table")
 Box = Type("box", also=(Table,), parents=(Gripper, Table))
@@ -13,16 +13,16 @@ g, b = Gripper("gripper"), Box("box")
 present, transit, line_in, switch, line_out, home, fly = terms(
     "present transit line_in switch line_out home fly"
 )
-MOTION = (transit(g), line_in(g, back=0.05), switch(close=g), line_out(g, up=0.1))
+MOTION = (present(b), transit(g), line_in(g, back=0.05), switch(close=g), line_out(g, up=0.1))
 
 
 def domain(*motion: Term) -> Domain:
-    snatch = Instruction("snatch", (g, b), (free(g),), (attach(b, g),), motion=motion)
+    snatch = Instruction("snatch", (g, b), (free(g), ~held(b)), (attach(b, g),), motion=motion)
     return Domain("test", (Gripper, Table, Box), (snatch,), ())
 
 
 def test_a_motion_is_read_as_it_is_declared() -> None:
-    bound = domain(present(b), *MOTION, home(g)).bind(Action("snatch", ("pr2L", "red")))
+    bound = domain(*MOTION, home(g)).bind(Action("snatch", ("pr2L", "red")))
     read = manoeuvre(bound)
     assert (read.name, read.gripper, read.body, read.parent) == ("snatch", "pr2L", "red", "pr2L")
     assert (read.presented, read.closing, read.opening) == (("red",), "pr2L", None)
@@ -33,7 +33,7 @@ def test_a_motion_is_read_as_it_is_declared() -> None:
 
 
 def test_other_ways_follow_the_declared_one() -> None:
-    motion = (transit(g), line_in(g, down=0.05, otherwise="back"), *MOTION[2:])
+    motion = (*MOTION[:2], line_in(g, down=0.05, otherwise="back"), *MOTION[3:])
     ways = manoeuvre(domain(*motion).bind(Action("snatch", ("pr2L", "red")))).way_in.ways
     assert [way.of(np.eye(3)).tolist() for way in ways] == [[0, 0, 0.05], [-0.05, 0, 0]]
 
@@ -51,15 +51,24 @@ def test_every_domain_of_the_project_can_be_moved(name: str) -> None:
             "instruction snatch, motion: fly: is an unknown step (accepted: present,",
         ),
         (
-            MOTION[1:],
-            "snatch, motion: line_in, switch, line_out: are not the steps of a motion",
+            (MOTION[0], *MOTION[2:]),
+            "snatch, motion: present, line_in, switch, line_out: are not the steps of a motion",
         ),
-        ((home(g), *MOTION), "home, transit, line_in, switch, line_out: are not the steps"),
         (
-            (MOTION[0], line_in(g), *MOTION[2:]),
+            (home(g), *MOTION),
+            "home, present, transit, line_in, switch, line_out: are",
+        ),
+        (
+            (*MOTION[:2], line_in(g), *MOTION[3:]),
             "snatch, motion: line_in: has no direction",
         ),
-        ((MOTION[0], line_in(g, left=0.1), *MOTION[2:]), "accepted: one of back, down, up with a"),
+        (
+            (*MOTION[:2], line_in(g, left=0.1), *MOTION[3:]),
+            "line_in: unknown option 'left'",
+        ),
+        ((*MOTION[:3], switch(), MOTION[4]), "switch: is not what the effect makes of the hands"),
+        ((*MOTION[:4], line_out(b, up=0.1)), "line_out: box has no part in it (accepted: gripper)"),
+        ((*MOTION, home()), "home: has 0 arguments (accepted: 1)"),
     ],
 )
 def test_a_motion_that_cannot_be_carried_out_is_refused(

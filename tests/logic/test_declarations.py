@@ -1,6 +1,7 @@
 """A domain with tools and facts, declared here, and declarations that cannot be served."""
 
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
@@ -28,6 +29,7 @@ from guided_lgp.logic.declarations import (
     free,
     held,
     holds,
+    numbers,
     on,
     same,
     terms,
@@ -51,7 +53,7 @@ HOOK = Instruction("hook", (g, k, b), (holds(g, k), ~held(b), clear(b), clear(k)
 PULL = Instruction(
     "pull",
     (g, k, b, t),
-    (holds(g, k), on(b, k), ~near(b)),
+    (holds(g, k), on(b, k), ~near(b), ~carries(b, t)),
     (attach(b, t), near(b)),
     contact=(hold(g, k),),
     motion=(drag(b, by=k),),
@@ -184,6 +186,8 @@ def changed(**changes: object) -> Instruction:
         (changed(precondition=(free(g), held(h))), "other is of type 'gripper'"),
         (changed(precondition=(free(g), Atom("helt", (b,)))), "unknown predicate 'helt'"),
         (changed(precondition=(free(g), Atom("held", (b, g)))), "held of 2 (accepted: of 1)"),
+        (changed(precondition=(free(g), ~same(g, h))), "does not say what box hangs on"),
+        (changed(precondition=(free(g), held(b))), "does not say what box hangs on"),
         (changed(effect=()), "effect: 0 of attach"),
         (changed(effect=(attach(b, g), attach(b, h))), "effect: 2 of attach"),
         (changed(effect=(attach(h, g),)), "other is of type 'gripper', which has no parent"),
@@ -205,13 +209,21 @@ def test_what_cannot_be_served_is_refused(instruction: Instruction, line: str) -
 
 def test_other_declarations_that_cannot_be_served() -> None:
     lid = Type("lid", parents=(Type("pot"),))
-    cases = (
+    cases: tuple[tuple[dict[str, Any], str], ...] = (
         ({"types": (Table, Box)}, "no type 'gripper'"),
         ({"types": (*HOOKS.types, lid)}, "type lid: unknown type 'pot'"),
         ({"goal_types": (GoalType("sunk", (b,), ()),)}, "goal type sunk, condition: is empty"),
         ({"goal_types": (GoalType("in", (b,), (carries(b, t),)),)}, "table is not a parameter"),
         ({"facts": (near, FactType("held", (b,)))}, "is a predicate of every domain"),
         ({"facts": ()}, "unknown predicate 'near'"),
+        (
+            {"instructions": (replace(PULL, precondition=(holds(g, k), on(b, k))),)},
+            r"precondition: table may be box, or on it .accepted: ~carries.box, table",
+        ),
+        (
+            {"goal_types": (GoalType("at", (b, t), (on(b, t),), numbers=numbers("x")),)},
+            "goal type at, final: is empty .accepted: one or more terms, for the numbers",
+        ),
     )
     for changes, line in cases:
         with pytest.raises(InputError, match=line):

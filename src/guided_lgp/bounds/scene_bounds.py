@@ -2,7 +2,7 @@
 
 from functools import cached_property
 
-from guided_lgp.bounds.coarse import CoarseBound, check_terms
+from guided_lgp.bounds.coarse import CoarseBound
 from guided_lgp.bounds.coarse.facts import Facts
 from guided_lgp.bounds.coarse.pairs import Pairs
 from guided_lgp.bounds.coarse.parts import Boxes, Parts
@@ -10,6 +10,7 @@ from guided_lgp.bounds.deadline import NEVER, Deadline
 from guided_lgp.bounds.goals import GoalTerms
 from guided_lgp.bounds.path import PathBound, check_motions
 from guided_lgp.bounds.results import CoarseResult, PathResult
+from guided_lgp.bounds.vocabulary import check_terms
 from guided_lgp.logic import Objective, Skeleton
 from guided_lgp.params import BoundsParams
 from guided_lgp.scene import Scene

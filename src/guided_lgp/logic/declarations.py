@@ -142,6 +142,9 @@ def terms(names: str) -> tuple[Callable[..., Term], ...]:
     return tuple(map(maker, names.split()))
 
 
+_HOLDS = ("holds", False)
+
+
 @dataclass(frozen=True)
 class Instruction:
     """A kind of action: what it needs, what it changes, and its geometry.
@@ -167,6 +170,13 @@ class Instruction:
     def into_hand(self) -> bool:
         """Whether a gripper holds the body afterwards."""
         return GRIPPER in self.attached.parent.type.kinds
+
+    @property
+    def holder(self) -> Variable | None:
+        """The gripper that holds the body before, by the precondition; None if it stands."""
+        body = self.attached.body
+        held = (atom for atom in self.precondition if (atom.predicate, atom.negated) == _HOLDS)
+        return next((atom.arguments[0] for atom in held if atom.arguments[1] == body), None)
 
 
 @dataclass(frozen=True)

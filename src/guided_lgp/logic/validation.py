@@ -113,6 +113,7 @@ def _check_instruction(one: Instruction, domain: "Domain", refuse: Refuse) -> No
         accepted = f"free({name}) or holds({name}, ...)"
         raise refuse(f"{field}, precondition", f"does not say what {name} holds", accepted)
     _check_effect(f"{field}, effect", one, domain, refuse)
+    _check_place(f"{field}, precondition", one, domain, refuse)
     for part, terms in (("contact", one.contact), ("motion", one.motion)):
         _check_terms(f"{field}, {part}", terms, one, refuse)
 
@@ -134,6 +135,8 @@ def _check_goal_type(one: GoalType, domain: "Domain", refuse: Refuse) -> None:
     _check_terms(f"{field}, lasting", one.lasting, one, refuse)
     if not (one.condition or one.final or one.lasting):
         raise refuse(f"{field}, condition", "is empty", "one or more atoms")
+    if (one.numbers or one.series) and not (one.final or one.lasting):
+        raise refuse(f"{field}, final", "is empty", "one or more terms, for the numbers")
     if one.derived is not None:
         _check_arguments(f"{field}, derived", [one.derived], one, refuse)
 
@@ -168,6 +171,35 @@ def _check_effect(field: str, one: Instruction, domain: "Domain", refuse: Refuse
             fault = f"{fact.predicate} follows from what hangs on what"
             declared = _list(known.name for known in domain.facts) or "none declared"
             raise refuse(field, fault, f"attach, and the facts of the domain: {declared}")
+
+
+def _check_place(field: str, one: Instruction, domain: "Domain", refuse: Refuse) -> None:
+    """That an instruction says where its body is before, and never hangs it below itself."""
+    body, parent = one.attached.body, one.attached.parent
+    if not any(_says_where(atom, body) for atom in one.precondition):
+        accepted = f"holds(..., {body.name}), on({body.name}, ...) or ~held({body.name})"
+        raise refuse(field, f"does not say what {body.name} hangs on", accepted)
+    if _may_carry_its_parent(one, domain.types):
+        accepted = f"~carries({body.name}, {parent.name})"
+        raise refuse(field, f"{parent.name} may be {body.name}, or on it", accepted)
+
+
+def _says_where(atom: Atom, body: Variable) -> bool:
+    """Whether an atom says in which hand a body is, or that it is in none."""
+    if atom.predicate == "holds":
+        return atom.arguments[-1] == body and not atom.negated
+    if atom.predicate == "on":
+        return atom.arguments[0] == body and not atom.negated
+    return atom == Atom("held", (body,), negated=True)
+
+
+def _may_carry_its_parent(one: Instruction, types: Sequence[Type]) -> bool:
+    body, parent = one.attached.body, one.attached.parent
+    movable = [kind for kind in types if kind.parents and kind.is_a(parent.type)]
+    if not movable or Atom("carries", (body, parent), negated=True) in one.precondition:
+        return False
+    same = any(kind.is_a(body.type) for kind in movable)
+    return same or Atom("clear", (body,)) not in one.precondition
 
 
 def _check_atoms(

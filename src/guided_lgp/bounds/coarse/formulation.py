@@ -10,7 +10,6 @@ others.
 from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
-from inspect import signature
 
 import numpy as np
 
@@ -22,14 +21,12 @@ from guided_lgp.bounds.program.geometry import Margins, SceneGeometry
 from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.bounds.program.slots import ArmConfiguration, HeldBox, KeyframeSlots
 from guided_lgp.bounds.results import Array
-from guided_lgp.bounds.terms import find_term, term_names
+from guided_lgp.bounds.terms import find_term
 from guided_lgp.bounds.terms.apart import keep_apart
 from guided_lgp.bounds.terms.clear import keep_clear
 from guided_lgp.bounds.terms.hold import take_over
 from guided_lgp.bounds.terms.term import GoalTerm
-from guided_lgp.errors import InputError
-from guided_lgp.logic import Action, Domain, GroundInstruction, GroundTerm, Skeleton, successor
-from guided_lgp.logic.declarations import Number, Term
+from guided_lgp.logic import Action, GroundInstruction, GroundTerm, Skeleton, successor
 
 
 @dataclass(frozen=True)
@@ -216,30 +213,3 @@ def _line(step: GroundTerm, low: bool) -> Line:
 
 _SHARE = 0.5
 """How much of a way up is asked for: halfway the hand may turn, the box is clear of its support."""
-
-
-def check_terms(domain: Domain) -> None:
-    """Check that every term that a domain declares is known, and takes its arguments.
-
-    Raises:
-        InputError: the first for which that is not so.
-    """
-    declared: list[tuple[str, tuple[Term, ...], tuple[Number, ...]]]
-    declared = [
-        (f"instruction {one.name}, contact", one.contact, ()) for one in domain.instructions
-    ]
-    for one in (*domain.goal_types, *domain.further_goals):
-        declared.append((f"goal type {one.name}, final", one.final, one.numbers))
-        declared.append((f"goal type {one.name}, lasting", one.lasting, one.numbers))
-    for field, terms, numbers in declared:
-        for term in terms:
-            where = f"{domain.name}.py: {field}: {term.name}"
-            if term.name not in term_names():
-                raise InputError(where, "is an unknown term", ", ".join(term_names()))
-            add = find_term(term.name).add
-            try:
-                options = {**term.options, **{number.name: 0.0 for number in numbers}}
-                signature(add).bind(None, *term.arguments, **options)
-            except TypeError as error:
-                accepted = ", ".join(list(signature(add).parameters)[1:])
-                raise InputError(where, str(error), accepted) from None

@@ -22,11 +22,16 @@ from guided_lgp.bounds.program import context
 from guided_lgp.bounds.results import Array
 from guided_lgp.errors import InputError
 from guided_lgp.logic import Action, Domain, GroundInstruction, GroundTerm
+from guided_lgp.logic.declarations import Instruction, Term
 
 _ONCE = ("transit", "line_in", "switch", "line_out")
 STEPS = ("present", *_ONCE, "home")
 """Every step, in the order in which a motion may have them."""
+_OF_ARMS = ("transit", "line_in", "line_out", "home")
 _DIRECTIONS = ("back", "down", "up")
+_LINE = (*_DIRECTIONS, "otherwise")
+_OPTIONS = {"present": ("by",), "line_in": _LINE, "switch": ("close", "open"), "line_out": _LINE}
+"""Which options steps have."""
 _PAST = 0.11
 """Length (m) of the way up on which an open hand leaves what it held, however deep."""
 UP = np.array([0.0, 0.0, 1.0])
@@ -99,20 +104,11 @@ def manoeuvre(declared: GroundInstruction, file: str = "") -> Manoeuvre:
         file: where that is, for messages: ``"handover.py: "``.
 
     Raises:
-        InputError: a step is unknown, missing or out of its order, or lacks what it needs.
+        InputError: a straight line has no direction.
     """
     name, motion = declared.action.instruction, declared.motion
     where = f"{file}instruction {name}, motion"
-    names = [step.name for step in motion]
-    for step in names:
-        if step not in STEPS:
-            raise InputError(f"{where}: {step}", "is an unknown step", ", ".join(STEPS))
-    if names != sorted(names, key=STEPS.index) or any(names.count(name) != 1 for name in _ONCE):
-        accepted = f"present ..., {', '.join(_ONCE)}, home ..."
-        raise InputError(f"{where}: {', '.join(names)}", "are not the steps of a motion", accepted)
     once = {step.name: step for step in motion}
-    if once["line_in"].symbols != once["transit"].symbols:
-        raise InputError(f"{where}: line_in", "moves another arm than transit")
     fingers = {hand: str(gripper) for hand, gripper in once["switch"].options.items()}
     return Manoeuvre(
         name,
@@ -131,11 +127,56 @@ def check_motions(domain: Domain) -> None:
     """Read the motion of every instruction of a domain.
 
     Raises:
-        InputError: one of them cannot be carried out, see :func:`manoeuvre`.
+        InputError: one of them cannot be carried out: a step is unknown, missing or out of its
+            order, or lacks what the instruction's effect needs.
     """
     for instruction in domain.instructions:
+        where = f"{domain.name}.py: instruction {instruction.name}, motion"
+        _check_order(where, [step.name for step in instruction.motion])
+        for step in instruction.motion:
+            _check_step(f"{where}: {step.name}", step, instruction)
+        _check_presented(where, instruction)
         names = tuple(parameter.name for parameter in instruction.parameters)
         manoeuvre(domain.bind(Action(instruction.name, names)), f"{domain.name}.py: ")
+
+
+def _check_order(where: str, names: list[str]) -> None:
+    for step in names:
+        if step not in STEPS:
+            raise InputError(f"{where}: {step}", "is an unknown step", ", ".join(STEPS))
+    if names != sorted(names, key=STEPS.index) or any(names.count(name) != 1 for name in _ONCE):
+        accepted = f"present ..., {', '.join(_ONCE)}, home ..."
+        raise InputError(f"{where}: {', '.join(names)}", "are not the steps of a motion", accepted)
+
+
+def _check_step(where: str, step: Term, one: Instruction) -> None:
+    """That a step has the arguments and options that it takes, and moves an arm that has a part."""
+    count, accepted = int(step.name != "switch"), _OPTIONS.get(step.name, ())
+    if len(step.arguments) != count:
+        raise InputError(where, f"has {len(step.arguments)} arguments", str(count))
+    for option in step.options:
+        if option not in accepted:
+            raise InputError(where, f"unknown option {option!r}", ", ".join(accepted) or "none")
+    taker = one.attached.parent if one.into_hand else None
+    hands = {"close": taker, "open": one.holder}
+    arms = one.parameters[:1] if step.name in ("transit", "line_in") else hands.values()
+    if step.name in _OF_ARMS and not set(step.arguments) <= {*arms} & {*hands.values()}:
+        names = ", ".join(arm.name for arm in arms if arm is not None)
+        raise InputError(where, f"{step.arguments[0].name} has no part in it", names)
+    if step.name == "switch" and step.options != {k: v for k, v in hands.items() if v is not None}:
+        wanted = ", ".join(f"{hand}={arm.name}" for hand, arm in hands.items() if arm is not None)
+        raise InputError(where, "is not what the effect makes of the hands", wanted)
+
+
+def _check_presented(where: str, one: Instruction) -> None:
+    """That what may be in another hand, or on something in it, is brought."""
+    needed = [] if one.holder == one.parameters[0] else [one.attached.body]
+    needed += [] if one.into_hand else [one.attached.parent]
+    presented = [step.arguments[0] for step in one.motion if step.name == "present"]
+    for body in needed:
+        if body not in presented:
+            accepted = ", ".join(f"present({body.name})" for body in needed)
+            raise InputError(where, f"lacks present({body.name})", accepted)
 
 
 def _way_in(where: str, step: GroundTerm) -> Line:

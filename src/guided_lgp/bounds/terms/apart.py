@@ -1,5 +1,6 @@
 """``apart(gripper, gripper)``: the spheres of two arms keep their distance."""
 
+from collections.abc import Iterator
 from functools import cache
 from itertools import permutations, product
 
@@ -9,6 +10,7 @@ from guided_lgp.bounds.program.context import Context
 from guided_lgp.bounds.program.kernels import SCALE, Kernel, distance, kernel
 from guided_lgp.bounds.program.kinematics import ArmKinematics, Chain, RobotKinematics, levers
 from guided_lgp.bounds.terms.term import Term
+from guided_lgp.logic.declarations import Instruction, Variable
 
 
 def _kernel(one: Chain, other: Chain, fixed: int) -> Kernel:
@@ -73,4 +75,10 @@ def _add(context: Context, gripper: str, other: str) -> None:
         keep_apart(context, other, segment.joints, gripper, posed[gripper].joints)
 
 
-TERM = Term(_add, _kernels)
+def _needed(one: Instruction) -> Iterator[tuple[Variable, ...]]:
+    """Of two hands on one body."""
+    if one.into_hand and one.holder is not None:
+        yield one.attached.parent, one.holder
+
+
+TERM = Term(_add, _kernels, needed=_needed)

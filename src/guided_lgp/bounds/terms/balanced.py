@@ -1,6 +1,6 @@
 """``balanced(box, support)``: the centres of mass of a stack are above what supports it."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import casadi as ca
 import numpy as np
@@ -11,6 +11,7 @@ from guided_lgp.bounds.program.kernels import SCALE, Kernel, in_frame, kernel
 from guided_lgp.bounds.program.kinematics import RobotKinematics
 from guided_lgp.bounds.program.slots import ZERO
 from guided_lgp.bounds.terms.term import Term
+from guided_lgp.logic.declarations import Instruction, Variable
 from guided_lgp.scene.tolerances import BALANCE_INSET
 
 STACK = 8
@@ -107,4 +108,10 @@ def _centre_of_mass(
     return x, y, z
 
 
-TERM = Term(_add, _kernels)
+def _needed(one: Instruction) -> Iterator[tuple[Variable, ...]]:
+    """Of what is put down."""
+    if not one.into_hand:
+        yield one.attached.body, one.attached.parent
+
+
+TERM = Term(_add, _kernels, needed=_needed)

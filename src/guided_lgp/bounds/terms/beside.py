@@ -4,6 +4,7 @@ A line, seen from above, separates the box and each neighbour that it meets on i
 angle is a variable of the pair. What ends below the box, or begins above its way, is none.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +18,7 @@ from guided_lgp.bounds.program.kinematics import RobotKinematics
 from guided_lgp.bounds.program.slots import PlanarPose
 from guided_lgp.bounds.results import Array
 from guided_lgp.bounds.terms.term import Term
+from guided_lgp.logic.declarations import Instruction, Variable
 
 _TOUCH = 0.002
 """Heights (m) that differ by less are one."""
@@ -115,4 +117,13 @@ def _separation(
 
 _QUARTERS = np.arange(4) * np.pi / 2
 
-TERM = Term(_add, _kernels)
+
+def _needed(one: Instruction) -> Iterator[tuple[Variable, ...]]:
+    """Of what is put down, and of what is lifted off its support."""
+    if not one.into_hand:
+        yield one.attached.body, one.attached.parent
+    elif one.holder is None:
+        yield (one.attached.body,)
+
+
+TERM = Term(_add, _kernels, needed=_needed)

@@ -5,7 +5,7 @@ pitch, offset and depth of the hand for the whole mode. The arm's joints are var
 configuration, and of the far end of each straight way to it or from it.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 import casadi as ca
 import numpy as np
@@ -35,6 +35,8 @@ from guided_lgp.bounds.program.slots import (
 from guided_lgp.bounds.results import Array
 from guided_lgp.bounds.terms.term import Term, UngraspableError
 from guided_lgp.errors import InputError
+from guided_lgp.logic.declarations import Instruction, Variable
+from guided_lgp.logic.symbols import GRIPPER
 from guided_lgp.poses import compose
 from guided_lgp.scene.tolerances import GRASP_ANGLE, GRASP_OFFSET, MARGIN
 
@@ -320,4 +322,12 @@ def check_given(placement: Pose, tool: Pose, given: Array) -> float:
     return float(np.maximum(way - GRASP_OFFSET, turn - GRASP_ANGLE).min())
 
 
-TERM = Term(_add, _kernels)
+def _needed(one: Instruction) -> Iterator[tuple[Variable, ...]]:
+    """Of every hand that the body leaves or comes into: at the switch it is in both."""
+    if one.holder is not None:
+        yield one.holder, one.attached.body
+    if one.into_hand:
+        yield one.attached.parent, one.attached.body
+
+
+TERM = Term(_add, _kernels, attaches=GRIPPER, needed=_needed)

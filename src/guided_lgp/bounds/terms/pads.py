@@ -1,5 +1,7 @@
 """``pads(gripper, box)``: the fingertips lie on the side of the box that they close on."""
 
+from collections.abc import Iterator
+
 import casadi as ca
 
 from guided_lgp.bounds.checks import Pose, axes_of, closing_axis, dot, offset_of
@@ -9,6 +11,7 @@ from guided_lgp.bounds.program.kernels import SCALE, Kernel, kernel
 from guided_lgp.bounds.program.kinematics import Chain, RobotKinematics
 from guided_lgp.bounds.terms.hold import grip
 from guided_lgp.bounds.terms.term import Term
+from guided_lgp.logic.declarations import Instruction, Variable
 from guided_lgp.scene.shapes import Convex
 
 TOLERANCE = 0.001
@@ -64,4 +67,10 @@ def check(body: Convex, placement: Pose, tool: Pose) -> float:
     return max(outside) + INSET - TOLERANCE
 
 
-TERM = Term(_add, _kernels)
+def _needed(one: Instruction) -> Iterator[tuple[Variable, ...]]:
+    """Of every new grasp."""
+    if one.into_hand:
+        yield one.attached.parent, one.attached.body
+
+
+TERM = Term(_add, _kernels, needed=_needed)

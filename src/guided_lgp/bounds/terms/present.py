@@ -4,6 +4,7 @@ It is held where another hand reaches it: as a support, or to take it.
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,7 @@ from guided_lgp.bounds.program.draft import Draft
 from guided_lgp.bounds.program.slots import ArmConfiguration, PlanarPose
 from guided_lgp.bounds.terms.hold import configuration, least_costs, pitches
 from guided_lgp.bounds.terms.term import Term
+from guided_lgp.logic.declarations import Instruction, Variable
 
 _CANDIDATES = 6
 """Poses drawn, of which the best to reach is taken."""
@@ -99,4 +101,12 @@ def _below(context: Context, name: str, reach: float) -> bool:
     )
 
 
-TERM = Term(_add)
+def _needed(one: Instruction) -> Iterator[tuple[Variable, ...]]:
+    """Of a support, which may be in a hand, and of what is handed over."""
+    if not one.into_hand:
+        yield (one.attached.parent,)
+    elif one.holder is not None:
+        yield (one.attached.body,)
+
+
+TERM = Term(_add, needed=_needed)

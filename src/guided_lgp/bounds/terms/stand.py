@@ -1,6 +1,6 @@
 """``stand(box, support)``: a box is put down level on a support, with all that it carries."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +15,7 @@ from guided_lgp.bounds.terms.balanced import inner
 from guided_lgp.bounds.terms.beside import Separation
 from guided_lgp.bounds.terms.hold import least_costs, pitches
 from guided_lgp.bounds.terms.term import Term
+from guided_lgp.logic.declarations import Instruction, Variable
 from guided_lgp.scene.tolerances import HEIGHT, LEVEL_ANGLE
 
 CANDIDATES = 6
@@ -126,4 +127,10 @@ def gap(size: Vector, placement: Pose, top: Top) -> float:
     return abs(placement[2] - size[2] / 2 - top.height)
 
 
-TERM = Term(_add)
+def _needed(one: Instruction) -> Iterator[tuple[Variable, ...]]:
+    """Of what is put down."""
+    if not one.into_hand:
+        yield one.attached.body, one.attached.parent
+
+
+TERM = Term(_add, attaches="table", needed=_needed)

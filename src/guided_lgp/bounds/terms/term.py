@@ -1,14 +1,20 @@
 """What every term has."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import Literal
 
 from guided_lgp.bounds.program.kernels import Kernel
 from guided_lgp.bounds.program.kinematics import RobotKinematics
 from guided_lgp.bounds.results import Array
+from guided_lgp.logic.declarations import Instruction, Variable
 
 
 def _none(robot: RobotKinematics) -> tuple[Kernel, ...]:
+    return ()
+
+
+def _never(instruction: Instruction) -> tuple[tuple[Variable, ...], ...]:
     return ()
 
 
@@ -22,6 +28,12 @@ class Term:
 
     add: Callable[..., None]
     kernels: Callable[[RobotKinematics], tuple[Kernel, ...]] = _none
+    part: Literal["contact", "final", "lasting"] = "contact"
+    """Where declarations name it."""
+    attaches: str = ""
+    """The type of parent on which a body hangs by it, if one does."""
+    needed: Callable[[Instruction], Iterable[tuple[Variable, ...]]] = _never
+    """With which arguments an instruction has to name it, by what it attaches to what."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,6 +45,7 @@ class GoalTerm(Term):
     ``check(size, placement, top, **numbers)`` is by how much (m or rad) the term does not hold.
     """
 
+    part: Literal["contact", "final", "lasting"] = "final"
     draw: Callable[..., Array]
     check: Callable[..., float]
 
