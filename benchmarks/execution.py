@@ -5,14 +5,16 @@ it. Needs nothing that the pipeline makes:
 
     python benchmarks/execution.py [--count N] [PART ...]
 
-With parts named, the figures of the others stay.
+With parts named, the figures of the others stay. A run that was interrupted goes on where it was.
 """
 
 import argparse
+import json
 import logging
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from statistics import fmean, median
 from typing import Any
@@ -42,17 +44,21 @@ from path import goals_after
 ROOT = Path(__file__).parents[1]
 FILE = ROOT / METRICS / "execution.json"
 PAGE = ROOT / "docs" / "execution_results.md"
+ROWS = ROOT / ".cache" / "execution"
+"""What has been measured so far, a line per task; gone when all is done."""
 SEED = 30_000
 """Of scenes and sequences; no stage of the pipeline uses it."""
 DRAWS = 500
 """Random sequences that are looked at, at most, for one that is wanted and feasible."""
 FRICTIONS = (0.6, 1.0)
 NOISE_M, CLOSED_LOOP_NOISE_M = 0.005, 0.008
+MOVED_M = 0.05
+AWAY = pose((5.0, 0.0, -1.0))
+"""Where nobody sees a box any more."""
 KINDS = ("moved", "dropped", "taken away")
+NO_PLAN: dict[str, Any] = {"succeeded": False, "fault": "no plan"}
 HANDS = {"both_arms": 2, "one_arm": 1}
 LIMITS = ("joint limit", "velocity", "acceleration", "jerk", "effort")
-
-logger = logging.getLogger("execution")
 
 
 @dataclass(frozen=True)
@@ -82,7 +88,8 @@ def planned(length: int, number: int, wanted: Callable[[Scene, Skeleton], bool])
 
 
 def _drawn(scene: Scene, length: int, rng: np.random.Generator) -> Skeleton:
-    state, skeleton = scene.state, ()
+    state = scene.state
+    skeleton: Skeleton = ()
     for _ in range(length):
         actions = list(applicable_actions(state, scene.symbols))
         skeleton = (*skeleton, actions[int(rng.integers(len(actions)))])
@@ -116,33 +123,44 @@ def single(scene: Scene, skeleton: Skeleton) -> bool:
 
 @dataclass(frozen=True)
 class Task:
-    """One plan under some conditions."""
+    """A random plan, and conditions under which it is carried out."""
 
     number: int
     length: int = 4
     wanted: Callable[[Scene, Skeleton], bool] = anything
-    conditions: Conditions = AS_PLANNED
+    conditions: tuple[Conditions, ...] = (AS_PLANNED,)
 
 
-def carried_out(task: Task) -> dict[str, Any] | None:
-    """What becomes of a random plan."""
+def carried_out(task: Task) -> list[dict[str, Any]]:
+    """What becomes of a random plan, under each of the conditions; empty if there is none."""
     drawn = planned(task.length, task.number, task.wanted)
-    if drawn is None:
-        return None
-    found = drawn.course
-    motion = (found.scene, found.skeleton, found.trajectory)
-    report = execute(found.scene, found.objective, *motion[1:], task.conditions)
-    q, times = _moving(found), found.trajectory.times
-    rows = switches_of(*motion)
-    assert isinstance(rows, list)
-    outside = rows_outside_limits(found.scene, found.skeleton, rows, q, times)
+    return [] if drawn is None else [_outcome(drawn.course, c) for c in task.conditions]
+
+
+def _outcome(found: Course, conditions: Conditions) -> dict[str, Any]:
+    motion = (found.skeleton, found.trajectory)
+    report = execute(found.scene, found.objective, *motion, conditions)
     return {
         "scene": found.scene.name,
         "actions": list(map(str, found.skeleton)),
         "succeeded": report.success,
         "fault": report.fault,
         "drift_mm": round(1000 * report.drift, 2),
-        "rows_outside_limits": outside,
+    }
+
+
+def shipped(task: Task) -> dict[str, Any] | None:
+    """What a random plan keeps to, and what becomes of it."""
+    drawn = planned(task.length, task.number, task.wanted)
+    if drawn is None:
+        return None
+    found = drawn.course
+    motion = (found.scene, found.skeleton, found.trajectory)
+    q, times = _moving(found), found.trajectory.times
+    rows = switches_of(*motion)
+    assert isinstance(rows, list)
+    return _outcome(found, AS_PLANNED) | {
+        "rows_outside_limits": rows_outside_limits(found.scene, found.skeleton, rows, q, times),
         "waiting_s": waiting(found, q),
         "duration_s": float(times[-1]),
         "duration_ratio": float(times[-1]) / drawn.in_turn_s,
@@ -162,52 +180,80 @@ def waiting(found: Course, q: Array) -> float:
     return float(np.diff(found.trajectory.times)[still].sum())
 
 
-def built(setup: str, conditions: Conditions, closed: bool, number: int) -> dict[str, Any] | None:
+def built(setup: str, number: int) -> dict[str, Any]:
     """What becomes of the tower of all boxes of a setup."""
+    found = _tower(setup, number)
+    return NO_PLAN if found is None else _outcome(found, AS_PLANNED)
+
+
+def built_with_noise(number: int) -> dict[str, Any]:
+    """What becomes of a tower of five from misplaced boxes, in closed and in open loop."""
+    found = _tower("d", number)
+    if found is None:
+        return {"closed": NO_PLAN, "open": NO_PLAN}
+    noisy = Conditions(noise=CLOSED_LOOP_NOISE_M, seed=number)
+    report = follow(found, noisy, timeout=60).report
+    closed = {"succeeded": report.success, "fault": report.fault}
+    return {"scene": found.scene.name, "closed": closed, "open": _outcome(found, noisy)}
+
+
+def _tower(setup: str, number: int) -> Course | None:
+    """The plan of a tower as a user gets it."""
     (scene,) = generate(setup, 1, SEED + number, f"{setup}-{number:03d}").scenes
     found = plan(scene, list(map(str, tower(scene.symbols.boxes, "tray"))), timeout=300)
     if found.path is None or found.path.trajectory is None:
         return None
-    path, trajectory = found.path, found.path.trajectory
-    if closed:
-        way = Course(found.scene, found.objective, path.skeleton, trajectory)
-        report = follow(way, conditions, timeout=60).report
-    else:
-        report = execute(found.scene, found.objective, path.skeleton, trajectory, conditions)
-    return {"scene": scene.name, "succeeded": report.success, "fault": report.fault}
+    return Course(found.scene, found.objective, found.path.skeleton, found.path.trajectory)
 
 
 def disturbed(number: int) -> dict[str, Any] | None:
     """What becomes of a plan in closed loop when a box is moved, dropped or taken away."""
-    drawn, kind = planned(4, number, single), KINDS[number % len(KINDS)]
+    drawn = planned(4, number, single)
     if drawn is None:
         return None
-    rng = np.random.default_rng([SEED, number])
-    report = follow(drawn.course, disturb=partial(_disturb, kind, rng), timeout=60).report
+    disturbance = Disturbance(KINDS[number % len(KINDS)], np.random.default_rng([SEED, number]))
+    followed = follow(drawn.course, disturb=disturbance, timeout=60)
+    if not disturbance.done:
+        return None
+    report = followed.report
     return {
         "scene": drawn.course.scene.name,
-        "kind": kind,
+        "kind": disturbance.kind,
+        "survived": report.success,
         "succeeded": report.success or bool(report.fault),
         "fault": report.fault,
+        "decisions": followed.decisions,
     }
 
 
-def _disturb(kind: str, rng: np.random.Generator, world: Laboratory, made: int) -> None:
-    if made > 1:
-        return
-    held = world.held()
-    if kind == "dropped" and held:
-        world.drop(sorted(held.values())[0])
-        return
-    free = sorted(set(world.boxes()) - held.keys())
-    box = free[int(rng.integers(len(free)))]
-    angle = rng.uniform(0, 2 * np.pi)
-    shift = (0.05 * np.cos(angle), 0.05 * np.sin(angle), 0.0)
-    away = pose((5.0, 0.0, -1.0)) if kind == "taken away" else None
-    world.put(box, compose(pose(shift), world.boxes()[box]) if away is None else away)
+@dataclass
+class Disturbance:
+    """Lays hands on a box, once: at the first look at which that can be done."""
+
+    kind: str
+    rng: np.random.Generator
+    done: bool = False
+
+    def __call__(self, world: Laboratory, made: int) -> None:
+        """Look whether there is such a box."""
+        held = world.held()
+        dropped = self.kind == "dropped"
+        boxes = sorted(held if dropped else set(world.boxes()) - held.keys())
+        if self.done or not boxes:
+            return
+        self.done = True
+        box = boxes[int(self.rng.integers(len(boxes)))]
+        if dropped:
+            world.drop(held[box])
+        elif self.kind == "moved":
+            angle = self.rng.uniform(0, 2 * np.pi)
+            shift = pose((MOVED_M * np.cos(angle), MOVED_M * np.sin(angle), 0.0))
+            world.put(box, compose(shift, world.boxes()[box]))
+        else:
+            world.put(box, AWAY)
 
 
-def counted(rows: list[dict[str, Any] | None]) -> dict[str, Any]:
+def counted(rows: Iterable[dict[str, Any] | None]) -> dict[str, Any]:
     """How many plans there were, and how many succeeded."""
     found = [row for row in rows if row is not None]
     return {
@@ -220,11 +266,9 @@ def counted(rows: list[dict[str, Any] | None]) -> dict[str, Any]:
 def plans(count: int) -> dict[str, Any]:
     """Random plans as shipped: limits, waiting, clearance and physics."""
     tasks = [Task(number, length=(4, 6, 8)[number % 3]) for number in range(count)]
-    rows = [row for row in _run(carried_out, tasks, "plans") if row is not None]
+    rows = [row for row in _run(shipped, tasks, "plans") if row is not None]
     kinds = {kind: sum(r["rows_outside_limits"][kind] for r in rows) for kind in LIMITS}
-    return {
-        "plans": len(rows),
-        "succeeded": sum(row["succeeded"] for row in rows),
+    return counted(rows) | {
         "rows_outside_limits": sum(kinds.values()),
         "rows_outside_by_kind": kinds,
         "duration_ratio": {name: _ratios(rows, hands) for name, hands in HANDS.items()},
@@ -239,45 +283,69 @@ def _ratios(rows: list[dict[str, Any]], hands: int) -> dict[str, float] | None:
     return {"median": median(ratios), "worst": max(ratios)} if ratios else None
 
 
-def under_friction(
-    count: int, wanted: Callable[[Scene, Skeleton], bool], friction: float, noise: float = 0.0
-) -> dict[str, Any]:
-    """Random plans with friction alone."""
-    conditions = Conditions("friction", friction, noise=noise)
-    tasks = [Task(number, wanted=wanted, conditions=conditions) for number in range(count)]
-    return counted(_run(carried_out, tasks, f"friction {friction}"))
+def friction(count: int) -> dict[str, Any]:
+    """Random plans with friction alone, as planned, and with boxes misplaced."""
+    exact = [Conditions("friction", mu) for mu in FRICTIONS]
+    tasks = [
+        Task(n, wanted=single, conditions=(*exact, _misplacing(n))) for n in range(2 * count // 3)
+    ]
+    *columns, noisy = zip(*filter(None, _run(carried_out, tasks, "friction")), strict=True)
+    by_friction = {str(mu): counted(rows) for mu, rows in zip(FRICTIONS, columns, strict=True)}
+    return {"friction": by_friction, "friction_noise_5mm": counted(noisy)}
+
+
+def _misplacing(number: int) -> Conditions:
+    return Conditions("friction", FRICTIONS[0], noise=NOISE_M, seed=number)
+
+
+def friction_loaded(count: int) -> dict[str, Any]:
+    """Random plans with friction alone in which hands carry boxes on the ones that they hold."""
+    conditions = (Conditions("friction", FRICTIONS[0]),)
+    tasks = [Task(n, wanted=loaded, conditions=conditions) for n in range(count // 3)]
+    rows = chain.from_iterable(_run(carried_out, tasks, "loaded"))
+    return {"friction_loaded": counted(rows)}
 
 
 def towers(count: int) -> dict[str, Any]:
     """Towers of eight and of ten, as shipped."""
-    return {
-        height: counted(_run(partial(built, setup, AS_PLANNED, False), range(count), setup))
-        for height, setup in (("8", "e8"), ("10", "e10"))
-    }
+    numbers = range(count // 6)
+    rows = {n: _run(partial(built, f"e{n}"), numbers, f"towers_{n}") for n in ("8", "10")}
+    return {"towers": {height: counted(found) for height, found in rows.items()}}
 
 
 def closed_loop(count: int) -> dict[str, Any]:
     """Towers of five with noise, in closed loop, and in open loop beside it."""
-    noisy = Conditions(noise=CLOSED_LOOP_NOISE_M)
-    closed = counted(_run(partial(built, "d", noisy, True), range(count), "closed loop"))
-    opened = counted(_run(partial(built, "d", noisy, False), range(count), "open loop"))
-    return closed | {"open_loop": opened}
+    rows = _run(built_with_noise, range(count // 3), "closed_loop")
+    opened = counted(row["open"] for row in rows)
+    return {"closed_loop_8mm": counted(row["closed"] for row in rows) | {"open_loop": opened}}
 
 
-def _run(function: Callable[[Any], Any], tasks: Any, title: str) -> list[Any]:
-    return parallel.run(function, list(tasks), load_params(ROOT / PARAMS).parallel, title)
+def disturbances(count: int) -> dict[str, Any]:
+    """Random plans in closed loop with a box moved, dropped or taken away."""
+    rows = [row for row in _run(disturbed, range(count // 3), "disturbed") if row is not None]
+    return {"disturbed": counted(rows) | {"survived": sum(row["survived"] for row in rows)}}
+
+
+def _run(function: Callable[[Any], Any], tasks: Sequence[Any], title: str) -> list[Any]:
+    """The rows of all tasks; an interrupted run goes on where it was."""
+    file = ROWS / f"{title}.jsonl"
+    file.parent.mkdir(parents=True, exist_ok=True)
+    rows = list(map(json.loads, file.read_text().splitlines())) if file.exists() else []
+    settings = load_params(ROOT / PARAMS).parallel
+    with file.open("a", encoding="utf-8") as lines:
+        for row in parallel.stream(function, list(tasks)[len(rows) :], settings, title):
+            rows.append(row)
+            print(json.dumps(row), file=lines, flush=True)
+    return rows
 
 
 MEASURES: Mapping[str, Callable[[int], dict[str, Any]]] = {
+    "towers": towers,
+    "closed_loop": closed_loop,
+    "disturbed": disturbances,
     "shipped": plans,
-    "friction": lambda count: {
-        str(mu): under_friction(2 * count // 3, single, mu) for mu in FRICTIONS
-    },
-    "friction_loaded": lambda count: under_friction(count // 3, loaded, FRICTIONS[0]),
-    "friction_noise_5mm": lambda count: under_friction(count // 3, single, FRICTIONS[0], NOISE_M),
-    "towers": lambda count: towers(count // 6),
-    "closed_loop_8mm": lambda count: closed_loop(count // 3),
-    "disturbed": lambda count: counted(_run(disturbed, range(count // 3), "disturbed")),
+    "friction": friction,
+    "loaded": friction_loaded,
 }
 """By part, what measures it, given the number of random plans."""
 
@@ -315,12 +383,12 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=60, help="random plans")
     parser.add_argument("parts", nargs="*", choices=[[], *MEASURES], metavar="PART")
     given = parser.parse_args()
-    figures = read_json(FILE, "an earlier run of all parts") if given.parts else {}
+    figures = read_json(FILE, "figures of an earlier run") if FILE.exists() else {}
     for name in given.parts or MEASURES:
-        measured = MEASURES[name](given.count)
-        figures |= measured if name == "shipped" else {name: measured}
-        logger.info("%s: %s", name, measured)
+        figures |= MEASURES[name](given.count)
         write_json(FILE, figures)
+        for file in ROWS.glob(f"{name}*"):
+            file.unlink()
     PAGE.write_text(page(figures), encoding="utf-8")
 
 

@@ -24,7 +24,7 @@ from guided_lgp.scene import Scene
 from guided_lgp.scene.world import World, initial_poses
 
 GRASP_SLACK = 0.006
-"""How far (m, rad) beyond the limits of verification a simulated grasp may be off."""
+"""How far (m, rad) beyond the limits of verification a simulated grasp may be off ..."""
 KNOCK = 0.005
 """How far (m) a hand may move what it is about to take."""
 DROP = 0.003
@@ -32,7 +32,8 @@ DROP = 0.003
 DRIFT = 0.01
 """How far (m) a box may be from where the plan leaves it ..."""
 DEVIATIONS = 4.0
-"""... and how many standard deviations farther where arms misplace boxes."""
+"""... and how many standard deviations farther where arms misplace boxes. The same goes for grasps,
+but their fingertips have to be on the box."""
 UPRIGHT = 0.9
 """Least vertical part of the contact normals where a box stands on something."""
 PLACE_SLACK = 0.005
@@ -103,6 +104,7 @@ class Execution:
         self._simulation = Simulation(self._world, conditions)
         self._held: dict[tuple[str, str], tuple[int | None, Array]] = {}
         self._seen = initial_poses(scene)
+        self._amiss = DEVIATIONS * conditions.noise
 
     def __enter__(self) -> "Execution":
         return self
@@ -169,7 +171,7 @@ class Execution:
             box: float(np.linalg.norm(boxes[box][:3] - planned[box][:3])) for box in sorted(boxes)
         }
         worst = max(drifts, key=lambda box: drifts[box])
-        allowed = DRIFT + DEVIATIONS * self._conditions.noise
+        allowed = DRIFT + self._amiss
         fault = f"drift {worst}" if drifts[worst] >= allowed else ""
         return PhysicsReport(all(goals.values()) and not fault, goals, drifts[worst], fault)
 
@@ -233,9 +235,10 @@ class Execution:
         """The fingers have closed; a fault if they are not on the box."""
         tool, placement = self._simulation.tool(gripper), self._simulation.box(box)
         body, arm = box_bodies(self._scene)[box], self._robot.arms[gripper]
-        faults = grasp_faults(arm, box, body, placement.tolist(), tool.tolist())
-        if faults and faults[0].amount > GRASP_SLACK:
-            return faults[0].constraint
+        for fault in grasp_faults(arm, box, body, placement.tolist(), tool.tolist()):
+            pads = fault.constraint.startswith("pads ")
+            if fault.amount > GRASP_SLACK + (0.0 if pads else self._amiss):
+                return fault.constraint
         constraint = None
         if self._conditions.grip == "friction":
             self._simulation.squeeze(gripper, self._forces[gripper, box, row])
