@@ -12,6 +12,7 @@ is, and those with it are affine in it: a step of a pass is the minimum of a few
 """
 
 import ctypes
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
@@ -48,20 +49,57 @@ def time_path(path: Array, arm: Arm) -> tuple[Array, Array]:
     Returns:
         times (T,) from 0 (s), and configurations (T, n).
     """
-    path = path[_apart(_lengths(path, arm))]
-    if len(path) == 1:
-        return np.zeros(1), path
-    s = np.concatenate([[0.0], np.cumsum(_lengths(path, arm))])
-    curve = Cubic(s, path)
+    law = fastest_law(path, arm, _SHARE)
+    if law.duration == 0.0:
+        return np.zeros(1), law.path
+    count = 1 + int(np.ceil(law.duration / INTERVAL))
+    times, step = np.linspace(0.0, law.duration, count, retstep=True)
+    rows = law(times)
     velocity, acceleration = _SHARE * arm.velocity_limits, _SHARE * arm.acceleration_limits
+    return times * _stretch(rows, float(step), velocity, acceleration), rows
+
+
+@dataclass(frozen=True)
+class Law:
+    """Where an arm is on a path that it follows from rest to rest."""
+
+    path: Array
+    """(m, n) rad"""
+    curve: Cubic | None
+    """Through the path; None where that is one configuration."""
+    grid: Array
+    """(N + 1,) parameters of the curve."""
+    speeds: Array
+    """(N + 1,) velocities of the parameter there."""
+    moments: Array
+    """(N + 1,) s, when it is there."""
+
+    @property
+    def duration(self) -> float:
+        """How long it takes (s)."""
+        return float(self.moments[-1])
+
+    def __call__(self, times: Array) -> Array:
+        """Configurations (k, n) at ascending times (k,) from 0 to ``duration``."""
+        if self.curve is None:
+            return np.repeat(self.path, len(times), axis=0)
+        rows = np.asarray(self.curve(_along(self.grid, self.speeds, self.moments, times)))
+        rows[times <= 0.0], rows[times >= self.duration] = self.path[0], self.path[-1]
+        return rows
+
+
+def fastest_law(path: Array, arm: Arm, share: float) -> Law:
+    """The fastest law for a path (m, n) of one arm within a share of its limits."""
+    path = path[_apart(_lengths(path, arm))]
+    s = np.concatenate([[0.0], np.cumsum(_lengths(path, arm))])
+    if len(path) == 1:
+        return Law(path, None, s, s, s)
+    curve = Cubic(s, path)
+    velocity, acceleration = share * arm.velocity_limits, share * arm.acceleration_limits
     grid = np.linspace(0.0, s[-1], max(10, int(s[-1] / _GRID_STEP)))
     speeds = np.sqrt(fastest(grid, *curve.derivatives(grid), velocity, acceleration))
     moments = np.concatenate([[0.0], np.cumsum(2 * np.diff(grid) / (speeds[1:] + speeds[:-1]))])
-    count = 1 + int(np.ceil(moments[-1] / INTERVAL))
-    times, step = np.linspace(0.0, moments[-1], count, retstep=True)
-    rows = np.asarray(curve(_along(grid, speeds, moments, times)))
-    rows[0], rows[-1] = path[0], path[-1]
-    return times * _stretch(rows, float(step), velocity, acceleration), rows
+    return Law(path, curve, grid, speeds, moments)
 
 
 def fastest(
