@@ -65,7 +65,7 @@ def joint_efforts(scene: Scene, q: Array, times: Array, carried: Iterable[Carrie
     if len(q) < 3:
         return np.zeros((0, q.shape[1]))
     rates, changes = derivatives(q, times)
-    efforts = np.array([_torques(scene, *row) for row in zip(q[1:-1], rates, changes, strict=True)])
+    efforts = _torques(scene, q[1:-1], rates, changes)
     for load in carried:
         rows = slice(max(load.span.start, 1), min(load.span.end, len(q) - 2) + 1)
         if rows.stop - rows.start > 0:
@@ -92,45 +92,45 @@ def derivatives(values: Array, times: Array) -> tuple[Array, Array]:
     return (rates[1:] + rates[:-1]) / 2, np.diff(rates, axis=0) / ((steps[1:] + steps[:-1]) / 2)
 
 
-def _torques(scene: Scene, q: Array, rate: Array, change: Array) -> Array:
-    """Of the arms alone (n,)."""
+def _torques(scene: Scene, q: Array, rates: Array, changes: Array) -> Array:
+    """Of the arms alone (R, n) at configurations (R, n), with their derivatives."""
     import pinocchio
 
     robot = scene.robot.description
     model, data = _model(scene)
     columns = [joint.velocity for joint in robot.kinematics.joints]
-    full = robot.kinematics.rows(q[None], scene.robot.fixed_values)[0]
-    velocity, acceleration = np.zeros((2, model.nv))
-    velocity[columns], acceleration[columns] = rate, change
-    torques = pinocchio.rnea(model, data, full, velocity, acceleration)[columns]
-    return np.asarray(torques - own_weights(scene, q[None])[0] if robot.balanced else torques)
+    velocities, accelerations = np.zeros((2, len(q), model.nv))
+    velocities[:, columns], accelerations[:, columns] = rates, changes
+    full = robot.kinematics.rows(q, scene.robot.fixed_values)
+    rows = zip(full, velocities, accelerations, strict=True)
+    torques = np.array([pinocchio.rnea(model, data, *row)[columns] for row in rows])
+    return np.asarray(torques - own_weights(scene, q) if robot.balanced else torques)
 
 
 def _load_torques(scene: Scene, q: Array, times: Array, load: Carried, rows: slice) -> Array:
     """Of one box, at some rows: (R, n)."""
     import pinocchio
 
-    robot, base = scene.robot.description, rotation_matrix(scene.robot.base_pose[3:])
-    arm, kinematics = robot.arms[load.span.gripper], robot.kinematics
-    tools = scene.robot.tool_poses(q)[load.span.gripper]
-    centres = compose(tools, load.grip)[:, :3]
-    _, changes = derivatives(centres, times)
+    robot, gripper = scene.robot.description, load.span.gripper
+    arm, around = robot.arms[gripper], slice(rows.start - 1, rows.stop + 1)
+    centres = compose(scene.robot.tool_poses(q[around], (gripper,))[gripper], load.grip)[:, :3]
+    _, changes = derivatives(centres, times[around])
     mass = BOX_DENSITY * volumes(scene)[load.span.box]
     pull = np.array([0.0, 0.0, GRAVITY])
-    forces = mass * (changes[rows.start - 1 : rows.stop - 1] + pull) @ base
+    forces = mass * (changes + pull) @ rotation_matrix(scene.robot.base_pose[3:])
     model, data = _model(scene)
-    columns = [joint.velocity for joint in kinematics.joints]
+    columns = [joint.velocity for joint in robot.kinematics.joints]
     frame = model.getFrameId(arm.tool_link)
     point = compose(arm.tool_in_link, load.grip)[:3]
-    found = []
-    full = kinematics.rows(q[rows], scene.robot.fixed_values)
-    for configuration, force in zip(full, forces, strict=True):
+    jacobians, turned = [], []
+    for configuration in robot.kinematics.rows(q[rows], scene.robot.fixed_values):
         jacobian = pinocchio.computeFrameJacobian(
             model, data, configuration, frame, pinocchio.ReferenceFrame.LOCAL_WORLD_ALIGNED
         )
-        turned = data.oMf[frame].rotation @ point
-        found.append((jacobian[:3].T @ force + jacobian[3:].T @ np.cross(turned, force))[columns])
-    return np.array(found)
+        jacobians.append(jacobian[:, columns])
+        turned.append(data.oMf[frame].rotation @ point)
+    wrenches = np.hstack([forces, np.cross(turned, forces)])
+    return np.einsum("rij,ri->rj", np.array(jacobians), wrenches)
 
 
 @lru_cache(maxsize=2)
