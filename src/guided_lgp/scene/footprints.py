@@ -30,10 +30,15 @@ def _corners(body: Body, half: tuple[float, float]) -> Array:
 
 def gap(first: Array, second: Array) -> float:
     """Distance of two convex footprints; negative is the depth of their overlap."""
-    separation = max(_separation(first, second), _separation(second, first))
-    if separation <= 0:
-        return separation
-    return min(_vertex_distance(first, second), _vertex_distance(second, first))
+    return float(gaps(first[None], second[None])[0, 0])
+
+
+def gaps(first: Array, second: Array) -> Array:
+    """Distances (n, m) of convex footprints (n, 4, 2) from others (m, 4, 2), as in :func:`gap`."""
+    one, other = first[:, None], second[None]
+    separation = np.maximum(_separation(one, other), _separation(other, one))
+    distance = np.minimum(_vertex_distance(one, other), _vertex_distance(other, one))
+    return np.where(separation <= 0, separation, distance)
 
 
 def inset(support: Array, points: Array) -> Array:
@@ -47,20 +52,23 @@ def _turn(yaw: float) -> Array:
 
 
 def _edges(corners: Array) -> tuple[Array, Array]:
-    edges = np.roll(corners, -1, axis=0) - corners
-    normals = np.stack([edges[:, 1], -edges[:, 0]], axis=1)
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return normals, np.sum(normals * corners, axis=1)
+    edges = np.roll(corners, -1, axis=-2) - corners
+    normals = np.stack([edges[..., 1], -edges[..., 0]], axis=-1)
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    return normals, np.sum(normals * corners, axis=-1)
 
 
-def _separation(first: Array, second: Array) -> float:
-    """The widest gap along the outward normals of the first footprint's edges."""
+def _separation(first: Array, second: Array) -> Array:
+    """The widest gaps along the outward normals of the first footprints' edges."""
     normals, offsets = _edges(first)
-    return float(np.max(np.min(second @ normals.T, axis=0) - offsets))
+    along = second @ np.swapaxes(normals, -1, -2)
+    return np.asarray(np.max(np.min(along, axis=-2) - offsets, axis=-1))
 
 
-def _vertex_distance(vertices: Array, polygon: Array) -> float:
-    start, step = polygon, np.roll(polygon, -1, axis=0) - polygon
-    offset = vertices[:, None] - start
-    along = np.clip(np.sum(offset * step, axis=2) / np.sum(step * step, axis=1), 0, 1)
-    return float(np.min(np.linalg.norm(offset - along[..., None] * step, axis=2)))
+def _vertex_distance(vertices: Array, polygon: Array) -> Array:
+    step = np.roll(polygon, -1, axis=-2) - polygon
+    offset = vertices[..., :, None, :] - polygon[..., None, :, :]
+    step, square = step[..., None, :, :], np.sum(step * step, axis=-1)[..., None, :]
+    along = np.clip(np.sum(offset * step, axis=-1) / square, 0, 1)
+    rest = np.linalg.norm(offset - along[..., None] * step, axis=-1)
+    return np.asarray(np.min(rest, axis=(-2, -1)))

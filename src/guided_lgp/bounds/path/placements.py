@@ -9,7 +9,7 @@ import numpy as np
 
 from guided_lgp.bounds.results import Array
 from guided_lgp.poses import compose, inverse, pose, yaw_of
-from guided_lgp.scene.footprints import gap
+from guided_lgp.scene.footprints import gaps
 
 MARGIN = 0.02
 """Distance (m) of a centre of mass from the edge of what it stands on."""
@@ -71,18 +71,16 @@ def alternatives(
     )
     drawn = drawn[inside]
     distance = np.hypot(drawn[:, 0] - reference[0], drawn[:, 1] - reference[1])
-    standing = [_corners(*other) for other in others]
-    found = [half_turn]
-    for sample in drawn[np.argsort(distance, kind="stable")]:
-        if len(found) > count:
-            break
-        if all(gap(_corners(sample, half), other) >= clearance for other in standing):
-            found.append(sample)
-    return found
+    drawn = drawn[np.argsort(distance, kind="stable")]
+    if others:
+        standing = np.concatenate([_corners(place[None], size) for place, size in others])
+        drawn = drawn[np.all(gaps(_corners(drawn, half), standing) >= clearance, axis=1)]
+    return [half_turn, *drawn[:count]]
 
 
-def _corners(placement: Array, half: Array) -> Array:
-    x, y, yaw = placement
-    c, s = np.cos(yaw), np.sin(yaw)
+def _corners(placements: Array, half: Array) -> Array:
+    """Corners (n, 4, 2) of a box with half extents (2,) at placements (n, 3)."""
+    c, s = np.cos(placements[:, 2]), np.sin(placements[:, 2])
+    turn = np.stack([c, s, -s, c], axis=-1).reshape(-1, 2, 2)
     corners = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]]) * half
-    return np.asarray(corners @ np.array([[c, s], [-s, c]]) + (x, y))
+    return np.asarray(corners @ turn + placements[:, None, :2])
