@@ -3,7 +3,7 @@ import pytest
 
 from guided_lgp.poses import rotation_matrix
 from guided_lgp.robots import PlacedArm, load_robot, robot_names
-from guided_lgp.robots.inverse import lengths_of
+from guided_lgp.robots.inverse import OffsetShoulder, lengths_of
 from guided_lgp.scene import PlacedRobot
 
 TURNED = PlacedRobot(base=(0.1, -0.2, 0.3), torso=0.2)
@@ -58,6 +58,25 @@ def test_every_valid_solution_reaches_the_pose_within_limits(gripper: str) -> No
     assert np.abs(turn - rotation[:, None, None])[valid].max() < 1e-9
     limits = ROBOT.arms[gripper].limits
     assert np.all((found[valid] >= limits[:, 0]) & (found[valid] <= limits[:, 1]))
+
+
+@pytest.mark.parametrize("gripper", GRIPPERS)
+def test_the_formulas_are_the_same_compiled_and_in_numpy(gripper: str) -> None:
+    lengths, arm = lengths_of(ROBOT, gripper), ROBOT.arms[gripper]
+    assert lengths is not None
+    limits = np.sort(arm.signs[:, None] * arm.limits, axis=1)
+    solver = OffsetShoulder(lengths, limits, arm.signs, 0.2)
+    postures = _postures(gripper, 100)
+    poses = solver.forward(postures)
+    for found, expected in zip(poses, solver.forward_in_numpy(postures), strict=True):
+        np.testing.assert_allclose(found, expected, atol=1e-13)
+    rotation, position = (array[:, None] for array in poses)
+    pans = np.linspace(*arm.limits[0], 9)[None]
+    (found, valid), (expected, reached) = (
+        solve(rotation, position, pans) for solve in (solver.inverse, solver.inverse_in_numpy)
+    )
+    assert np.array_equal(valid, reached)
+    np.testing.assert_allclose(found[valid], expected[valid], atol=1e-12)
 
 
 def test_out_of_reach_is_not_valid() -> None:

@@ -54,6 +54,15 @@ def test_the_home_posture_is_free_of_collisions(robot: Robot) -> None:
         assert not result.isCollision() or len(links) == 1 or links in robot.disabled_pairs
 
 
+def test_compiled_kinematics_are_those_of_pinocchio(robot: Robot) -> None:
+    fixed = {joint.joint: joint.default for joint in robot.fixed_joints.values()}
+    q = np.random.default_rng(0).uniform(*robot.position_limits.T, (50, len(robot.joint_names)))
+    links = [link for arm in robot.arms.values() for link in (*arm.segment_ends, arm.tool_link)]
+    found = robot.kinematics.link_poses(q, fixed, links)
+    expected = robot.kinematics.link_poses_by_pinocchio(q, fixed, links)
+    np.testing.assert_allclose(found, expected, atol=1e-13)
+
+
 def test_inverse_kinematics_lead_back_home(robot: Robot) -> None:
     fixed = {joint.joint: joint.default for joint in robot.fixed_joints.values()}
     poses = robot.kinematics.link_poses(

@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from guided_lgp.bounds.results import Array
 from guided_lgp.compiled import load_compiled
+from guided_lgp.robots.kinematics import flat, moving_joints
 from guided_lgp.robots.measures.hulls import shape_vertices
 
 _ROUNDING = 1e-5
@@ -64,14 +64,15 @@ class Certificate:
         self._certify = None if library is None else library.certify
         numbers = [model.getJointId(name) for name in moving]
         self._columns = np.argsort(numbers, kind="stable")  # from the root to the tips
-        joints, self._carriers = _moving_joints(model, template, sorted(numbers))
+        parents, joints, self._carriers = moving_joints(model, template, sorted(numbers))
         bodies = [_boxed(shape_vertices(body.geometry)) for body in geometry.geometryObjects]
         self._boxes = [body.frame for body in bodies]
         self._joint = np.empty(len(bodies), dtype=np.intc)
         self._frame = np.empty((len(bodies), 12), dtype=np.float32)
         radii = [np.linalg.norm(body.vertices, axis=1).max() for body in bodies]
         self._arrays = [
-            *joints,
+            parents,
+            *(array.astype(np.float32) for array in joints),
             np.array([body.half for body in bodies], dtype=np.float32),
             np.cumsum([0, *(len(body.vertices) for body in bodies)]).astype(np.intc),
             np.concatenate([body.vertices for body in bodies]).astype(np.float32),
@@ -87,7 +88,7 @@ class Certificate:
         """Put a body somewhere: pose (4, 4) in the frame of a joint of the model."""
         carrier, offset = self._carriers[joint]
         self._joint[body] = carrier
-        self._frame[body] = _flat(offset @ placement @ self._boxes[body])
+        self._frame[body] = flat(offset @ placement @ self._boxes[body])
 
     def free(self, values: Array, pairs: NDArray[np.intc], padding: float) -> NDArray[np.bool_]:
         """Which configurations (m,) are surely free; none of them without a compiler.
@@ -116,41 +117,6 @@ class Certificate:
 def _library() -> ctypes.CDLL | None:
     source = Path(__file__).with_name("certificate.c").read_text(encoding="utf-8")
     return load_compiled("certificate", source)
-
-
-def _moving_joints(
-    model: Any, template: Array, moving: list[int]
-) -> tuple[list[NDArray[Any]], list[tuple[int, Array]]]:
-    """The moving joints alone, as certificate.c wants them.
-
-    Returns:
-        parent, placement, sine, versine and slide; and for every joint of the model the moving one
-        that it hangs on (-1: none), with its pose (4, 4) there.
-    """
-    data = model.createData()
-    pin.forwardKinematics(model, data, template)
-    carriers: list[tuple[int, Array]] = [(-1, np.eye(4))]
-    parents: list[int] = []
-    rows: list[tuple[Array, ...]] = []
-    for joint in range(1, model.njoints):
-        carrier, offset = carriers[model.parents[joint]]
-        if joint not in moving:
-            carriers.append((carrier, offset @ data.liMi[joint].homogeneous))
-            continue
-        carriers.append((len(parents), np.eye(4)))
-        parents.append(carrier)
-        placement = offset @ model.jointPlacements[joint].homogeneous
-        slide, axis = np.split(np.ravel(data.joints[joint].S), 2)
-        cross = np.cross(axis, np.eye(3)).T
-        turn = placement[:3, :3]
-        rows.append((_flat(placement), turn @ cross, turn @ cross @ cross, turn @ slide))
-    arrays = (np.array(column, dtype=np.float32) for column in zip(*rows, strict=True))
-    return [np.array(parents, dtype=np.intc), *arrays], carriers
-
-
-def _flat(placement: Array) -> Array:
-    """Rotation by rows, then position (12,), of a pose (4, 4)."""
-    return np.concatenate([placement[:3, :3].ravel(), placement[:3, 3]])
 
 
 def _boxed(vertices: Array) -> _Body:

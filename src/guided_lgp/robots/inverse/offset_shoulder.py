@@ -6,12 +6,18 @@ elbow follows from the distance shoulder-wrist, roll and lift from the direction
 the wrist from the remaining rotation: two solutions per pose and pan, one per sign of the elbow's
 side. A right arm is solved as the mirror image of a left one.
 
-Rotations are matrices here, since their columns are what the formulas need.
+Rotations are matrices here, since their columns are what the formulas need. The formulas are there
+twice: compiled, pose by pose, and in numpy for where there is no compiler.
 """
+
+import ctypes
+from functools import cache
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from guided_lgp.compiled import address, load_compiled
 from guided_lgp.poses import Array
 from guided_lgp.robots.inverse.human_like import HumanLike
 
@@ -21,6 +27,17 @@ _JUMP = 0.35
 _SINGULAR = 0.08
 """Distance (rad) of elbow and wrist from straight, where the arm is singular: joints race there."""
 _CONTINUOUS = [4, 6]
+
+
+class _Arm(ctypes.Structure):
+    """``shoulder_arm`` of offset_shoulder.c."""
+
+    _fields_ = (
+        *((name, ctypes.c_double) for name in ("lift", "upper", "fore", "hand")),
+        ("shoulder", 3 * ctypes.c_double),
+        ("signs", 7 * ctypes.c_double),
+        ("limits", 14 * ctypes.c_double),
+    )
 
 
 class OffsetShoulder:
@@ -41,6 +58,8 @@ class OffsetShoulder:
         self.shoulder = self._mirror @ lengths.shoulder + np.array([0.0, 0.0, lift])
         self._limits = limits + np.array([1e-4, -1e-4])
         self._limits[[3, 5], 1] = np.minimum(self._limits[[3, 5], 1], -_SINGULAR)
+        vectors = (tuple(array.ravel()) for array in (self.shoulder, signs, self._limits))
+        self._arm = _Arm(lengths.lift, lengths.upper, lengths.fore, lengths.hand, *vectors)
 
     def inverse(
         self, rotation: Array, position: Array, redundancy: Array
@@ -54,8 +73,27 @@ class OffsetShoulder:
 
         Returns:
             q (..., 2, 7), one row per side of the elbow, the two continuous joints within half a
-            turn of zero, and valid (..., 2): inside reach and joint limits.
+            turn of zero, and valid (..., 2): inside reach and joint limits. Where it is not valid,
+            q means nothing.
         """
+        library = _library()
+        if library is None:
+            return self.inverse_in_numpy(rotation, position, redundancy)
+        shape = np.broadcast_shapes(rotation.shape[:-2], position.shape[:-1], redundancy.shape)
+        given = (
+            np.ascontiguousarray(np.broadcast_to(array, (*shape, *array.shape[array.ndim - own :])))
+            for array, own in ((rotation, 2), (position, 1), (redundancy, 0))
+        )
+        q, valid = np.empty((*shape, 2, 7)), np.empty((*shape, 2), dtype=np.bool_)
+        arrays = (*given, q, valid)
+        count = valid.size // 2
+        library.inverse(ctypes.byref(self._arm), count, *map(address, arrays))
+        return q, valid
+
+    def inverse_in_numpy(
+        self, rotation: Array, position: Array, redundancy: Array
+    ) -> tuple[Array, NDArray[np.bool_]]:
+        """The same without a compiler, for all poses at once."""
         upper, fore, hand = self._lengths.upper, self._lengths.fore, self._lengths.hand
         limits = self._limits
         rot = self._mirror @ rotation @ self._mirror
@@ -130,6 +168,17 @@ class OffsetShoulder:
         Args:
             q: (..., 7) in rad.
         """
+        library = _library()
+        if library is None:
+            return self.forward_in_numpy(q)
+        joints, shape = np.ascontiguousarray(q), q.shape[:-1]
+        rotation, position = np.empty((*shape, 3, 3)), np.empty((*shape, 3))
+        arrays = (joints, rotation, position)
+        library.forward(ctypes.byref(self._arm), q.size // 7, *map(address, arrays))
+        return rotation, position
+
+    def forward_in_numpy(self, q: Array) -> tuple[Array, Array]:
+        """The same without a compiler."""
         upper, fore, hand = self._lengths.upper, self._lengths.fore, self._lengths.hand
         c, s = np.cos(q * self._signs), np.sin(q * self._signs)
         frame = np.broadcast_to(np.eye(3), (*q.shape[:-1], 3, 3))
@@ -155,3 +204,9 @@ def _turn(frame: Array, axis: int, cosine: Array, sine: Array) -> Array:
     turned[..., :, first] = c * frame[..., :, first] + s * frame[..., :, second]
     turned[..., :, second] = c * frame[..., :, second] - s * frame[..., :, first]
     return turned
+
+
+@cache
+def _library() -> ctypes.CDLL | None:
+    source = Path(__file__).with_name("offset_shoulder.c").read_text(encoding="utf-8")
+    return load_compiled("offset_shoulder", source)
