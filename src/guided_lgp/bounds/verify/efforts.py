@@ -130,7 +130,7 @@ def _load_torques(scene: Scene, q: Array, times: Array, load: Carried, rows: sli
         jacobians.append(jacobian[:, columns])
         turned.append(data.oMf[frame].rotation @ point)
     wrenches = np.hstack([forces, np.cross(turned, forces)])
-    return np.einsum("rij,ri->rj", np.array(jacobians), wrenches)
+    return np.asarray(np.einsum("rij,ri->rj", np.array(jacobians), wrenches))
 
 
 @lru_cache(maxsize=2)
