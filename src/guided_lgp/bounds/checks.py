@@ -116,7 +116,13 @@ def _tops_in_boxes(scene: Scene) -> Mapping[str, tuple[tuple[float, float], floa
 
 def axes_of(pose: Pose) -> tuple[Vector, Vector, Vector]:
     """The body's x, y and z axis in the world."""
-    _, _, _, x, y, z, w = pose
+    return _axes(tuple(pose[3:]))
+
+
+@lru_cache(maxsize=4096)
+def _axes(quaternion: tuple[float, ...]) -> tuple[Vector, Vector, Vector]:
+    """Kept, since several checks look at one pose, and most boxes stay where they are."""
+    x, y, z, w = quaternion
     return (
         (1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)),
         (2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)),

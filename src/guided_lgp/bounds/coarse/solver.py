@@ -4,7 +4,7 @@ import ctypes
 import logging
 from dataclasses import astuple, dataclass, fields
 from functools import cache
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,6 +89,16 @@ class _CSettings(ctypes.Structure):
     )
 
 
+@cache
+def _in_c(settings: Settings) -> _CSettings:
+    return _CSettings(*astuple(settings))
+
+
+def _address(array: NDArray[Any]) -> int:
+    """Where an array begins: several times faster than by its ``ctypes``."""
+    return int(array.__array_interface__["data"][0])
+
+
 class Compiled:
     """The loop in C with a robot's kernels as machine code."""
 
@@ -109,14 +119,13 @@ class Compiled:
         worst = ctypes.c_double()
         header = _CProgram(
             *(getattr(program, name) for name in _COUNTS),
-            *(getattr(program, name).ctypes.data for name in _ARRAYS),
+            *(_address(getattr(program, name)) for name in _ARRAYS),
         )
-        options = _CSettings(*astuple(settings))
         steps = self._solve(
             ctypes.addressof(header),
-            ctypes.addressof(options),
-            values.ctypes.data,
-            residuals.ctypes.data,
+            ctypes.addressof(_in_c(settings)),
+            _address(values),
+            _address(residuals),
             ctypes.addressof(worst),
         )
         return Solution(values, residuals, worst.value, steps)
@@ -126,9 +135,7 @@ class Compiled:
         number, outputs = self._forms[chain]
         arguments = np.ascontiguousarray(arguments)
         solutions = np.empty((len(arguments), outputs))
-        self._closed_form(
-            number, outputs, len(arguments), arguments.ctypes.data, solutions.ctypes.data
-        )
+        self._closed_form(number, outputs, len(arguments), _address(arguments), _address(solutions))
         return solutions
 
 

@@ -4,6 +4,7 @@ from array import array
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,8 +63,7 @@ class Program:
         return int(self.row_start[-1])
 
 
-@dataclass(frozen=True)
-class Instance:
+class Instance(NamedTuple):
     """What a kernel instance means: its constraint's name and symbols, and the action's index."""
 
     action: int

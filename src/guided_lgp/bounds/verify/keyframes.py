@@ -2,6 +2,8 @@
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -18,7 +20,7 @@ from guided_lgp.bounds.terms import carried
 from guided_lgp.bounds.terms.carried import relative
 from guided_lgp.bounds.verify.geometry import declared, grasp_faults, placement_faults
 from guided_lgp.logic import Action, Skeleton, State, successor
-from guided_lgp.robots import Robot
+from guided_lgp.robots import Fingers, Robot
 from guided_lgp.scene.world import World, poses_at_side
 
 LIMIT_TOLERANCE = 1e-6
@@ -59,8 +61,7 @@ def _faults(
         arm, tool = robot.arms[gripper], reached.tools[gripper]
         width = convex[box].size[closing_axis(boxes[box], tool)]
         keeps = (box, gripper) in state.held and (box, gripper) in after.held
-        value = arm.fingers.value if keeps else arm.fingers.value_around
-        world.set_fingers({gripper: value(width)})
+        world.set_fingers({gripper: _finger_value(arm.fingers, width, keeps)})
         violations += grasp_faults(arm, box, convex[box], boxes[box], tool, given.get(box))
     violations += placement_faults(world.scene, boxes, support)
     bodies = body_names(world.scene)
@@ -98,18 +99,25 @@ def verify_keyframes(
     start = Keyframe(world.scene.robot.description.home, poses_at_side(world.scene))
     for action in skeleton[:verified]:
         state = successor(state, action)
-    last = _Reached(world, after_action[verified - 1] if verified else start)
+    first = after_action[verified - 1] if verified else start
+    last = _REACHED.get(first) or _Reached(world, first)
     for index, action in enumerate(skeleton[verified:], verified):
         after = successor(state, action)
         moves = ((at_switch[index], state, action), (after_action[index], after, None))
         for keyframe, modes, contact in moves:
-            reached = _Reached(world, keyframe)
+            reached = _REACHED[keyframe] = _Reached(world, keyframe)
             found = _faults(world, reached, modes, contact) or _slips(last, reached, modes)
             if found:
                 return Violation(found[0].constraint, found[0].amount, index)
             last = reached
         state = after
     return None
+
+
+@lru_cache(maxsize=1024)
+def _finger_value(fingers: Fingers, width: float, closed: bool) -> float:
+    """Where the fingers of a hand are (rad or m) on a box of a width (m), or open around it."""
+    return fingers.value(width) if closed else fingers.value_around(width)
 
 
 def joint_limit_faults(robot: Robot, q: Array) -> list[Violation]:
@@ -141,6 +149,10 @@ class _Reached:
     def carrier(self, name: str) -> list[float] | None:
         """The pose of a tool or box; of what never moves, none."""
         return self.tools.get(name) or self.boxes.get(name)
+
+
+_REACHED: WeakKeyDictionary[Keyframe, _Reached] = WeakKeyDictionary()
+"""What has been checked and may be gone on from: there is no need to set the world to it again."""
 
 
 def _slips(last: _Reached, reached: _Reached, state: State) -> list[Violation]:
