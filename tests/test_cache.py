@@ -114,6 +114,9 @@ def test_a_relative_folder_does_not_count(tmp_path: Path, monkeypatch: pytest.Mo
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
     monkeypatch.setenv("XDG_CACHE_HOME", "relative")
     assert cache.private_folder() == tmp_path / "home" / ".cache" / "guided-lgp"
+    monkeypatch.setenv("HOME", "relative")
+    with pytest.raises(InputError, match="XDG_CACHE_HOME: is not set, and there is no home"):
+        cache.private_folder()
     assert not Path("relative").exists()
 
 

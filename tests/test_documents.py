@@ -82,7 +82,11 @@ def test_faults(content: bytes, fault: str, tmp_path: Path) -> None:
         ("a: 1\nb: 2\na: 3", "has the key 'a' twice"),
         ("a: {b: 1, b: 2}", "has the key 'b' twice"),
         ("a: 1" + "0" * 400, "10000000000000000000 is not a finite number"),
-        ("a: 1" + "0" * 5000, "Exceeds the limit"),
+        ("a: 1" + "0" * 5000, "10000000000000000000 is not a finite number"),
+        ("a: 1" + ":0" * 500_000, "1:0:0:0:0:0:0:0:0:0: is not a finite number"),
+        ("a: 1" + ":0" * 500 + ".5", "int too large to convert to float"),
+        ("a: {b: 1, <<: {c: 1}, b: 2}", "has the key 'b' twice"),
+        ("a: &x {b: 1, b: 2}\nc: {<<: *x}", "has the key 'b' twice"),
         ('a: "\\ud800"', "has a lone surrogate U+D800"),
         ("a: [", "expected the node content"),
         ("a: 2024-13-45", "month must be in 1..12"),
@@ -97,6 +101,21 @@ def test_faults_in_yaml(content: str, fault: str, tmp_path: Path) -> None:
         read_yaml(file)
     assert fault in str(caught.value)
     assert len(str(caught.value)) < len(str(file)) + 310
+
+
+def test_merges_in_yaml(tmp_path: Path) -> None:
+    """Also those that PyYAML would make billions of pairs of."""
+    file = tmp_path / "file.yaml"
+    ten = (f"a{n}: &a{n} {{<<: [{', '.join([f'*a{n - 1}'] * 10)}]}}" for n in range(1, 10))
+    file.write_text("\n".join(["a0: &a0 {k: 1, l: 2}", *ten, "b: {<<: *a9, l: 3, m: 4}"]))
+    found = read_yaml(file)
+    assert found["a9"] == {"k": 1, "l": 2}
+    assert found["b"] == {"k": 1, "l": 3, "m": 4}
+
+
+def test_yaml_has_an_end() -> None:
+    with pytest.raises(InputError, match="/dev/zero: is larger than 1 MiB"):
+        read_yaml(Path("/dev/zero"))
 
 
 def test_yaml(tmp_path: Path) -> None:

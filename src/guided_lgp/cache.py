@@ -25,12 +25,21 @@ logger = logging.getLogger(__name__)
 
 
 def cache_folder() -> Path:
-    """Where it is: ``$XDG_CACHE_HOME/guided-lgp``; a relative path there does not count."""
+    """Where it is: ``$XDG_CACHE_HOME/guided-lgp``; a relative path there does not count.
+
+    Raises:
+        InputError: there is no home either, or a relative one: never the current folder.
+    """
     base = Path(os.environ.get("XDG_CACHE_HOME", ""))
-    try:
-        return (base if base.is_absolute() else Path.home() / ".cache") / "guided-lgp"
-    except RuntimeError:
-        raise InputError("$XDG_CACHE_HOME", "is not set, and there is no home", ACCEPTED) from None
+    return (base if base.is_absolute() else _home() / ".cache") / "guided-lgp"
+
+
+def _home() -> Path:
+    with suppress(RuntimeError):  # nobody knows where
+        home = Path.home()
+        if home.is_absolute():
+            return home
+    raise InputError("$XDG_CACHE_HOME", "is not set, and there is no home", ACCEPTED)
 
 
 def private_folder() -> Path:

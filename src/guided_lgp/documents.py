@@ -23,7 +23,11 @@ from guided_lgp.errors import InputError
 
 LARGEST = 2**31
 """Bytes that a document may have: twice those of the scenes of a million configurations."""
+LARGEST_YAML = 2**20
+"""Bytes of what people write: PyYAML takes up to ten seconds for so many."""
 _BLOCK = 2**20
+_LONGEST_NUMBER = 1100
+"""Characters of a number in YAML: so many bits has the largest one, and each may be a digit."""
 _SURROGATE = r"\\u[dD][89a-fA-F]"
 STANDARD_OUTPUT = Path("-")
 _UNFINISHED = ".unfinished-"
@@ -33,12 +37,13 @@ _LEFTOVER_S = 60.0
 """Age of a leftover: a writer locks its file within microseconds."""
 
 
-def read_text(path: Path, accepted: str = "") -> str:
+def read_text(path: Path, accepted: str = "", largest: int = LARGEST) -> str:
     """Read a text in UTF-8, of which there may be no end: devices and pipes have none.
 
     Args:
         path: the file.
         accepted: where such a file comes from, for the message.
+        largest: bytes that it may have.
 
     Raises:
         InputError: the file is missing, too large or not UTF-8.
@@ -46,13 +51,13 @@ def read_text(path: Path, accepted: str = "") -> str:
     where = str(path)
     try:
         with path.open("rb") as stream:
-            content = _beginning(stream)
+            content = _beginning(stream, largest)
     except OSError as error:
         raise InputError(where, error.strerror or "cannot be read", accepted) from None
     except ValueError:  # a NUL, or half a pair of surrogates
         raise InputError(where, "is no name of a file", accepted) from None
-    if len(content) > LARGEST:
-        raise InputError(where, f"is larger than {LARGEST // 2**20} MiB", accepted)
+    if len(content) > largest:
+        raise InputError(where, f"is larger than {largest // 2**20} MiB", accepted)
     try:
         return content.decode("utf-8")
     except UnicodeDecodeError as error:
@@ -98,14 +103,14 @@ def parse_json(text: str, where: str, accepted: str = "") -> Any:
         raise InputError(where, f"is not JSON: {error}", accepted) from None
 
 
-def _beginning(stream: BinaryIO) -> bytes:
-    """What is in a stream, or a bit more than a document may have.
+def _beginning(stream: BinaryIO, largest: int) -> bytes:
+    """What is in a stream, or a bit more than it may have.
 
     The size of the file does not tell: devices and pipes have none. Neither is all of it asked for
     at once, for which Python would take as much memory.
     """
     content = bytearray()
-    while len(content) <= LARGEST and (block := stream.read(_BLOCK)):
+    while len(content) <= largest and (block := stream.read(_BLOCK)):
         content += block
     return bytes(content)
 
@@ -160,15 +165,15 @@ def read_yaml(path: Path, accepted: str = "") -> Any:
     Raises:
         InputError: the file is missing, not YAML, or has a key twice.
     """
-    where, text = str(path), read_text(path, accepted)
+    where, text = str(path), read_text(path, accepted, LARGEST_YAML)
     try:
         document = _Loader(text).get_single_data()
         _require_an_end(document, frozenset(), set())
         return document
     except RecursionError:
         raise InputError(where, "is nested too deeply", accepted) from None
-    except (yaml.YAMLError, ValueError, LookupError, AttributeError) as error:
-        # PyYAML raises the last three for values that do not fit their tag, such as 2024-13-45.
+    except (yaml.YAMLError, ValueError, LookupError, AttributeError, OverflowError) as error:
+        # PyYAML raises the last four for values that do not fit their tag, such as 2024-13-45.
         raise InputError(where, f"is not YAML: {' '.join(str(error).split())}", accepted) from None
 
 
@@ -194,19 +199,27 @@ def _require_an_end(value: Any, above: frozenset[int], known: set[int]) -> None:
 class _Loader(yaml.SafeLoader):
     """PyYAML's, which takes the last of several values of a key, and any number and string."""
 
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        scalars = (key for key, _ in node.value if isinstance(key, yaml.ScalarNode))
-        count = Counter((key.tag, key.value) for key in scalars)
+    def flatten_mapping(self, node: yaml.MappingNode) -> None:
+        """Put in place what is merged by ``<<``; of a key, the last value counts.
+
+        The others go at once: mappings that merge each other's would have billions of them.
+        """
+        count = Counter(filter(None, (_scalar(key) for key, _ in node.value)))
         for (_, key), times in count.items():
             if times > 1:
                 raise ValueError(f"has the key {key!r:.40} twice")
-        return dict(super().construct_mapping(node, deep))
+        super().flatten_mapping(node)
+        last = {_scalar(pair[0]) or id(pair[0]): pair for pair in node.value}
+        node.value = list(last.values())
 
     def construct_yaml_int(self, node: yaml.ScalarNode) -> int:
-        value = int(super().construct_yaml_int(node))
+        value = int(super().construct_yaml_int(_short(node)))
         if abs(value) > sys.float_info.max:
             raise ValueError(f"{node.value[:20]} is not a finite number")
         return value
+
+    def construct_yaml_float(self, node: yaml.ScalarNode) -> float:
+        return float(super().construct_yaml_float(_short(node)))
 
     def construct_yaml_str(self, node: yaml.ScalarNode) -> str:
         value = str(super().construct_yaml_str(node))
@@ -217,7 +230,19 @@ class _Loader(yaml.SafeLoader):
         return value
 
 
+def _scalar(key: yaml.Node) -> tuple[str, str] | None:
+    return (key.tag, key.value) if isinstance(key, yaml.ScalarNode) else None
+
+
+def _short(number: yaml.ScalarNode) -> yaml.ScalarNode:
+    """A number whose value can be finite; for others, PyYAML may take minutes."""
+    if len(number.value) > _LONGEST_NUMBER:
+        raise ValueError(f"{number.value[:20]} is not a finite number")
+    return number
+
+
 _Loader.add_constructor("tag:yaml.org,2002:int", _Loader.construct_yaml_int)
+_Loader.add_constructor("tag:yaml.org,2002:float", _Loader.construct_yaml_float)
 _Loader.add_constructor("tag:yaml.org,2002:str", _Loader.construct_yaml_str)
 
 
