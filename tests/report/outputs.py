@@ -1,5 +1,6 @@
 """The outputs of all earlier stages with made-up figures, so that the report can be rendered."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -269,3 +270,10 @@ def motion(box: str) -> Trajectory:
     q = np.tile(load_robot("pr2").home, (len(times), 1))
     q[:, 0] -= 0.8 * np.sin(np.pi * times / 4)
     return Trajectory(load_robot("pr2").joint_names, times, q, (Attachment(box, "pr2L", 10, 30),))
+
+
+def with_fingers(motion: Trajectory) -> Trajectory:
+    """The motion with joints of fingers, which stand still."""
+    joints = load_robot("pr2").moving_joints
+    more = np.zeros((len(motion.times), len(joints) - len(motion.joint_names)))
+    return replace(motion, joint_names=joints, q=np.hstack([motion.q, more]))

@@ -53,11 +53,11 @@ def test_bodies_and_joints_are_where_the_plan_has_them(scene: Scene, tmp_path: P
 def test_the_actions_are_logged_where_they_begin(
     scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    trajectory = outputs.motion("red")
+    trajectory = outputs.with_fingers(outputs.motion("red"))
     monkeypatch.setattr(motion, "switches_of", lambda *_: [5, 9])
     file = tmp_path / "plan.rrd"
     write_recording(trajectory, scene, file, SKELETON, (Goal("on", ("red", "green")),))
-    table = moving(file, PLAN).sort_by(TIMELINE)
+    table = moving(file, f"{PLAN}/pr2L").sort_by(TIMELINE)
     texts = [row[0] for row in table["TextLog:text"].to_pylist()]
     assert texts == ["(grasp pr2L red)", "(place pr2L red green)"]
     seconds = np.array(table[TIMELINE].cast(pa.int64())) / 1e9

@@ -8,6 +8,7 @@ import numpy as np
 import outputs
 import pytest
 
+from guided_lgp.bounds.results import Trajectory
 from guided_lgp.errors import InputError
 from guided_lgp.logic import Action, Goal
 from guided_lgp.poses import compose, inverse, pose
@@ -98,16 +99,45 @@ def test_live_view_serves_the_loopback_interface_until_stopped(scene: Scene) -> 
     assert not thread.is_alive()
 
 
-def test_steps_begin_with_the_switch_before_and_lead_the_player(
+def moved(scene: Scene, rows: int, *moving: tuple[str, int, int]) -> Trajectory:
+    """A motion in steps of 0.1 s; the first joint of an arm turns from a row to another one."""
+    robot = scene.robot.description
+    q = np.zeros((rows, len(robot.moving_joints)))
+    for hand, first, last in moving:
+        column = robot.moving_joints.index(robot.arms[hand].joints[0])
+        q[first + 1 : last + 1, column] = 0.01
+        q[:, column] = np.cumsum(q[:, column])
+    return Trajectory(robot.moving_joints, 0.1 * np.arange(rows), q, ())
+
+
+def spans(scene: Scene, trajectory: Trajectory, *hands: str) -> list[tuple[float, float]]:
+    skeleton = tuple(Action("grasp", (hand, "red")) for hand in hands)
+    listed = steps(scene, skeleton, trajectory)
+    assert tuple(step.action for step in listed) == skeleton
+    return [(round(step.time, 3), round(step.end, 3)) for step in listed]
+
+
+def test_steps_follow_each_other_or_overlap(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(motion, "switches_of", lambda *_: [10, 14, 20])
+    alone = moved(scene, 31, ("pr2L", 0, 30))  # without a rest: from switch to switch
+    assert spans(scene, alone, "pr2L", "pr2L", "pr2L") == [(0, 1), (1, 1.4), (1.4, 3)]
+    both = moved(scene, 31, ("pr2L", 0, 30), ("pr2R", 5, 17))
+    assert spans(scene, both, "pr2L", "pr2R", "pr2L") == [(0, 1), (0.5, 1.7), (1, 3)]
+    turns = moved(scene, 31, ("pr2L", 0, 12), ("pr2R", 12, 30))  # one after the other
+    assert spans(scene, turns, "pr2L", "pr2R", "pr2R") == [(0, 1.2), (1.2, 1.4), (1.4, 3)]
+
+
+def test_steps_are_listed_and_lead_the_player(
     scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    trajectory = outputs.motion(scene.boxes[0].name)
+    trajectory = outputs.with_fingers(outputs.motion(scene.boxes[0].name))
     skeleton = (Action("grasp", ("pr2L", "red")), Action("place", ("pr2L", "red", "green")))
     assert steps(scene, skeleton[::-1], trajectory) == []
     monkeypatch.setattr(motion, "switches_of", lambda *_: [5, 9])
-    assert [step.time for step in steps(scene, skeleton, trajectory)] == [0, trajectory.times[5]]
     page = tmp_path / "page.html"
     replay_html(trajectory, scene, page, skeleton, (Goal("on", ("red", "green")),))
     text = page.read_text(encoding="utf-8")
-    assert '<button data-time="1.0">(grasp pr2L red)</button>' in text
+    turn, end = (f"{1 + trajectory.times[row]:.1f}" for row in (5, -1))
+    assert f'<button data-time="1.0" data-end="{turn}">(grasp pr2L red)</button>' in text
+    assert f'<button data-time="{turn}" data-end="{end}">(place pr2L red green)</button>' in text
     assert "<strong>(on red green)</strong>" in text

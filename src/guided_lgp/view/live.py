@@ -71,7 +71,7 @@ class _Player:
         self._time: Any = gui.add_slider("time (s)", 0.0, end, 0.01, 0.0)
         self._speed = gui.add_dropdown("speed", _SPEEDS, initial_value="1")
         for step in listed:
-            gui.add_button(step.text).on_click(partial(self._go, step.time))
+            gui.add_button(str(step.action)).on_click(partial(self._go, step.time))
         self._shown = -1.0
 
     def _go(self, time: float, _: object) -> None:
@@ -88,8 +88,12 @@ class _Player:
             self._shown = now
             row = int(np.searchsorted(self._times, now, side="right")) - 1
             show(self._viewer, self._frames[max(row, 0)])
-            self._current.content = self._action(now)
+            self._current.content = self._actions(now)
 
-    def _action(self, now: float) -> str:
-        begun = [number for number, step in enumerate(self._steps) if step.time <= now]
-        return f"{begun[-1] + 1} `{self._steps[begun[-1]].text}`" if begun else ""
+    def _actions(self, now: float) -> str:
+        """What the hands are at."""
+        return " ".join(
+            f"{number} `{step.action}`"
+            for number, step in enumerate(self._steps, 1)
+            if step.time <= now < step.end
+        )

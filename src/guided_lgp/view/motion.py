@@ -2,19 +2,22 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
 
 from guided_lgp.bounds.results import Trajectory
 from guided_lgp.bounds.verify.attachments import switches_of
-from guided_lgp.logic import Skeleton
+from guided_lgp.logic import Action, Skeleton
 from guided_lgp.poses import Array, compose, inverse
 from guided_lgp.scene.model import Scene
 from guided_lgp.scene.world import initial_poses
 
 FRAME_RATE = 15.0
 """Frames per second."""
+_STAND_S = 0.4
+"""A hand that stands for so long has nothing to do; fingers close and arms turn back in less."""
 
 
 @dataclass(frozen=True)
@@ -31,10 +34,11 @@ class Frame:
 
 @dataclass(frozen=True)
 class Step:
-    """An action, and the time (s) at which the robot turns to it."""
+    """An action, and from when to when (s) its hand is at it."""
 
-    text: str
+    action: Action
     time: float
+    end: float
 
 
 class Stage(Protocol):
@@ -80,12 +84,53 @@ def _rows(trajectory: Trajectory) -> list[int]:
 
 
 def steps(scene: Scene, skeleton: Skeleton, trajectory: Trajectory) -> list[Step]:
-    """The actions of a plan; one begins when the switch of the one before is done."""
+    """The actions of a plan, in their order; those of different hands may overlap.
+
+    One begins when its hand sets out, or has done the one before, and ends when the hand stands,
+    or turns to the next one.
+    """
     switches = switches_of(scene, skeleton, trajectory)
     if not isinstance(switches, list):
         return []
-    began = [0.0, *trajectory.times[switches[:-1]].tolist()]
-    return [Step(str(action), time) for action, time in zip(skeleton, began, strict=True)]
+    hands = [action.symbols[0] for action in skeleton]
+    spans = {
+        hand: iter(_spans(_stands(scene, trajectory, hand), switches_of_hand))
+        for hand, switches_of_hand in _by_hand(hands, switches).items()
+    }
+    times = trajectory.times
+    return [
+        Step(action, *(float(times[row]) for row in next(spans[hand])))
+        for action, hand in zip(skeleton, hands, strict=True)
+    ]
+
+
+def _by_hand(hands: Sequence[str], switches: Sequence[int]) -> dict[str, list[int]]:
+    pairs = list(zip(hands, switches, strict=True))
+    return {hand: [switch for other, switch in pairs if other == hand] for hand in hands}
+
+
+def _spans(stands: Sequence[tuple[int, int]], switches: Sequence[int]) -> list[tuple[int, int]]:
+    """First and last row of every action of a hand."""
+    begun = [
+        max([before, *(end for _, end in stands if end <= switch)])
+        for before, switch in pairwise([0, *switches])
+    ]
+    ended = [min(max(row, switch) for row, end in stands if end > switch) for switch in switches]
+    following = [*begun[1:], ended[-1]]
+    return [(a, min(b, after)) for a, b, after in zip(begun, ended, following, strict=True)]
+
+
+def _stands(scene: Scene, trajectory: Trajectory, hand: str) -> list[tuple[int, int]]:
+    """First and last row of every stretch in which arm and fingers stand; the end is one, too."""
+    arm = scene.robot.description.arms[hand]
+    moved = np.diff(trajectory.joints((*arm.joints, *arm.fingers.joints)), axis=0).any(axis=1)
+    turns = np.flatnonzero(np.diff(np.pad((~moved).astype(int), 1))).tolist()
+    long = [
+        (start, end)
+        for start, end in zip(turns[::2], turns[1::2], strict=True)
+        if trajectory.times[end] - trajectory.times[start] >= _STAND_S
+    ]
+    return [*long, (len(trajectory.times) - 1, len(trajectory.times))]
 
 
 def show(stage: Stage, frame: Frame) -> None:

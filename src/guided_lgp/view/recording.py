@@ -18,7 +18,7 @@ from guided_lgp.view.robot_shapes import Colour, RobotShapes
 TIMELINE = "plan"
 """The recording's time: s from the start of the motion."""
 PLAN = "/plan"
-"""Where the goals and the actions are."""
+"""Where the goals are, and below it the actions of each hand."""
 
 
 def write_recording(
@@ -51,7 +51,7 @@ def write_recording(
             show(stage, frame)
         for step in steps(scene, skeleton, trajectory) if skeleton else ():
             stream.set_time(TIMELINE, duration=step.time)
-            stream.log(PLAN, rerun.TextLog(step.text))
+            stream.log(f"{PLAN}/{step.action.symbols[0]}", rerun.TextLog(str(step.action)))
         stream.disconnect()
 
 

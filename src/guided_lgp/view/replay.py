@@ -51,7 +51,8 @@ def replay_html(
 
 def _panel(shown: list[Step], objective: Objective) -> str:
     items = "".join(
-        f'<li><button data-time="{_STILL_S + step.time:.1f}">{html.escape(step.text)}</button></li>'
+        f'<li><button data-time="{_STILL_S + step.time:.1f}" data-end="{_STILL_S + step.end:.1f}">'
+        f"{html.escape(str(step.action))}</button></li>"
         for step in shown
     )
     template = Path(__file__).with_name("panel.html").read_text(encoding="utf-8")
