@@ -44,6 +44,8 @@ ELEVEN = [f"(on b{number} right)" for number in range(1, 12)]
         ("can_between_walls", ["(on can right)"], 2),
         # Small bodies are held by the fingertips.
         ("cubes_25mm", ["(on c1 c3)", "(on c2 c1)"], 4),
+        # What stands side by side is lifted off as near as it is.
+        ("cube_row", ["(on c1 right)"], 2),
         # A plate that juts out: fingers above and below it, where it is and where it goes.
         ("plate_at_edge", ["(on plate right)"], 2),
         ("plate_at_edge", ["(on plate post)"], 2),

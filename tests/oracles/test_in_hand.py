@@ -85,7 +85,7 @@ def test_a_can_may_be_turned_in_the_hand(tmp_path: Path) -> None:
         (
             [{"name": "c", "size": SIZE, "position": [0.5, 0, 0.9], "on": "blue"}],
             {},
-            "'c' stands on unknown table 'blue'",
+            "'c' cannot stand on 'blue', which pr2. holds, at the start",
         ),
     ],
 )

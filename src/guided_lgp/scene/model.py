@@ -260,6 +260,9 @@ class Scene(Document):
         for box in self.movable:
             if box.name in self.held:
                 continue
+            if box.on in self.held:
+                held = f"{box.on!r}, which {self.held[box.on]} holds"
+                raise ValueError(f"box {box.name!r} cannot stand on {held}, at the start")
             if box.on not in supports or box.on == box.name:
                 raise ValueError(f"box {box.name!r} stands on unknown table {box.on!r}")
             if "position" not in box.model_fields_set:

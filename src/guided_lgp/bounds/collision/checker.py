@@ -21,11 +21,13 @@ from guided_lgp.bounds.collision.certificate import Certificate
 from guided_lgp.bounds.results import Array
 from guided_lgp.poses import IDENTITY
 from guided_lgp.robots import Arm
-from guided_lgp.scene import Scene
+from guided_lgp.scene import Box, Scene
 from guided_lgp.scene.shapes import Convex
 
 PADDING = 0.003
 """Distance (m) that everything keeps from everything, declared contacts apart."""
+_ROUNDING = 0.0005
+"""How much nearer (m) bodies may come that stand nearer than that at the start."""
 _FEW = 3
 """Configurations that are checked one by one: a certificate for them costs as much."""
 
@@ -124,12 +126,31 @@ class CollisionChecker:
         self._certificate = Certificate(
             self._model, self._template, self._geometry, robot.moving_joints
         )
+        self._yield_where_near(scene)
         self._moving = len(robot.moving_joints)
         self._fingers = {gripper: arm.fingers for gripper, arm in robot.arms.items()}
         self._finger_at = {
             gripper: np.array([self._coordinate(joint) for joint in fingers.joints], dtype=int)
             for gripper, fingers in self._fingers.items()
         }
+
+    def _yield_where_near(self, scene: Scene) -> None:
+        """What stands side by side at the start may be lifted off as near as it is."""
+        standing = {box.name: box for box in scene.movable if box.name not in scene.held}
+        for box in standing.values():
+            self._move(box.name, 0, pin.XYZQUATToSE3(box.placement))
+        pin.updateGeometryPlacements(
+            self._model, self._data, self._geometry, self._geometry_data, self._template
+        )
+        still = {body.name for body in (*scene.supports, *scene.obstacles)}
+        for number, pair in enumerate(self._geometry.collisionPairs):
+            first, second = self._names[pair.first], self._names[pair.second]
+            beside = {first, second} <= {*standing, *still} and not {first, second} <= still
+            if beside and not _stands(standing, first, second):
+                found = pin.computeDistance(self._geometry, self._geometry_data, number)
+                if found.min_distance < PADDING:
+                    request = self._geometry_data.collisionRequests[number]
+                    request.security_margin = found.min_distance - _ROUNDING
 
     def enter(self, scene: PlanningScene) -> None:
         """Put the boxes where the scene says, and check what can collide while its arm moves.
@@ -330,6 +351,12 @@ class CollisionChecker:
         first, second = np.array(named, dtype=int).reshape(-1, 2).T
         pairs[first, second] = pairs[second, first] = False
         return np.asarray(pairs)
+
+
+def _stands(standing: Mapping[str, Box], first: str, second: str) -> bool:
+    """Whether one of two bodies stands on the other."""
+    pairs = (first, second), (second, first)
+    return any(one in standing and standing[one].on == other for one, other in pairs)
 
 
 @lru_cache(maxsize=1)

@@ -31,7 +31,7 @@ _MOTION = 0.05
 """Cost per rad^2 of shoulder and elbow from the arm's side: only among what is reached."""
 _PANS = np.linspace(-0.55, 1.6, 10)
 """Values (rad) of the shoulder's pan that are tried, left arm: from the middle to its own side."""
-_VALUES = 6
+_VALUES = 12
 """Values of the redundant joint of any other arm, spread over its range."""
 _TURN = 2 * np.pi
 
