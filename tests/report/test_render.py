@@ -237,7 +237,7 @@ def test_rendering_again_gives_the_same_bytes_and_other_figures_are_optional(
     assert "needs 6.5, 6.5 calls of the coarse bound" in page
     (rival, *_) = rows_of(root / "reports/tables/cases_compared.md")
     assert rival[3:6] == ["18.5", "A\\*, facts", "0.35 (0.30 to 0.40)"]
-    assert "then learning is a convenience, not a necessity" in page
+    assert "learning is a convenience there, not a necessity" in page
     assert '<a href="../docs/studies.md">' in page
     rows = {row[0]: row[1:] for row in rows_of(root / "reports/tables/draws.md")}
     assert rows["Paper's networks"] == ["92.0% ± 2.0%"] * 6 + ["3"]

@@ -145,9 +145,9 @@ def _verdict(sizes: Mapping[str, Metrics]) -> str:
     text = f"the policy needs {amount} half the calls of the best search without one {where}."
     if convenient:
         text += (
-            " Where the facts cost nothing, because many problems are solved in one scene, a "
-            "search that knows them needs fewer than twice the calls of the policy with "
-            f"{_listed(convenient)} boxes: then learning is a convenience, not a necessity."
+            " Where many problems share a scene, so that its facts cost nothing, a search that "
+            f"knows them needs less than twice the policy's calls with {_listed(convenient)} "
+            "boxes: learning is a convenience there, not a necessity."
         )
     return text
 

@@ -23,13 +23,13 @@ def answers(generalization: Metrics, scalability: Metrics, timing: Metrics) -> l
     printed = paper.GENERALIZATION[PAPERS.table_1]
     ours, best, control = (generalization[row.table_1] for row in (PAPERS, BEST, CONTROL))
     return [
-        "New scenes and goals: with the paper's networks the plan is a shortest one in "
+        "New scenes and goals. With the paper's networks the plan is a shortest one in "
         f"{pair(ours)} of the problems, over all and over unseen objectives (paper: "
         f"{pair(printed)}); with the relational policy in {pair(best)}.",
-        "Without a policy: best-first search, whose cost counts the actions still needed, finds a "
+        "Without a policy. Best-first search, whose cost counts the actions still needed, finds a "
         f"shortest plan in {pair(control)} of the same problems.",
-        f"Size of the tree: {tree(scalability, timing)}",
-        f"Longer tasks: {many(scalability)}",
+        f"Size of the tree. {tree(scalability, timing)}",
+        f"Longer tasks. {many(scalability)}",
     ]
 
 
