@@ -113,11 +113,6 @@ def test_merges_in_yaml(tmp_path: Path) -> None:
     assert found["b"] == {"k": 1, "l": 3, "m": 4}
 
 
-def test_yaml_has_an_end() -> None:
-    with pytest.raises(InputError, match="/dev/zero: is larger than 1 MiB"):
-        read_yaml(Path("/dev/zero"))
-
-
 def test_yaml(tmp_path: Path) -> None:
     file = tmp_path / "file.yaml"
     file.write_text("a: &a {x: 1, y: 2}\nb: {<<: *a, x: 3}\nc: 2020-01-01")
@@ -148,10 +143,13 @@ def test_missing_and_unreadable_files(tmp_path: Path) -> None:
             read_json(path)
 
 
-def test_a_file_without_an_end(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("read", [read_json, read_yaml])
+def test_a_file_without_an_end(
+    read: Callable[[Path], object], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(documents, "LARGEST", 2**20)
     with pytest.raises(InputError, match="/dev/zero: is larger than 1 MiB"):
-        read_json(Path("/dev/zero"))
+        read(Path("/dev/zero"))
 
 
 def test_no_number_is_lost(tmp_path: Path) -> None:

@@ -74,7 +74,7 @@ def read_json(path: Path, accepted: str = "") -> Any:
     Raises:
         InputError: the file is missing, too large, not UTF-8 or not JSON.
     """
-    return parse_json(read_text(path, accepted), str(path), accepted)
+    return parse_json(read_text(path, accepted, LARGEST), str(path), accepted)
 
 
 def parse_json(text: str, where: str, accepted: str = "") -> Any:
