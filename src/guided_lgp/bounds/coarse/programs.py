@@ -14,8 +14,9 @@ _MARGINS = (
     Margins(clear=-0.004, apart=-0.01, beside=0.003),
 )
 """Comfortable ones, close ones, and such that only the verification limits: starts take turns."""
-_KEPT = 100
-"""How many programs are kept to go on from, of up to 0.3 MB each."""
+_KEPT = 400
+"""How many programs are kept to go on from: those that an enumeration comes back to, length by
+length. One of four actions takes 30 kB, one of 40 takes 0.3 MB."""
 
 
 class Formulators:
