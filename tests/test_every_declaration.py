@@ -6,7 +6,7 @@ and asks for a message that names what is missing.
 
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import fields, replace
+from dataclasses import MISSING, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -44,10 +44,12 @@ from guided_lgp.paths import SOURCES
 from guided_lgp.policy.registry import (
     POLICIES,
     TRAINED_POLICIES,
+    check_policies,
     load_policy,
     missing_instructions,
 )
 from guided_lgp.robots import load_robot, robot_names
+from guided_lgp.robots.build import read_robot
 from guided_lgp.scene import PlacedRobot, Scene, generate
 from guided_lgp.scene.world import World
 from guided_lgp.search import planners
@@ -313,6 +315,71 @@ def test_a_missing_policy_is_named_with_its_planner(policy: str) -> None:
         check_planners([name for name in POLICIES if name != policy])
 
 
+def without_a_field(one: Any) -> Iterator[tuple[str, Any]]:
+    """A row without each of the fields that it states: with what counts if it does not."""
+    for field in fields(one):
+        stated = getattr(one, field.name)
+        default = "" if field.default is MISSING else field.default
+        if stated != default and not callable(stated):
+            yield field.name, replace(one, **{field.name: default})
+
+
+CHOICES = {
+    **dict.fromkeys(("adapt", "over_sequences", "widens"), "how it searches: two ways"),
+    **dict.fromkeys(("table_1", "table_3", "drawn", "headline", "printed"), "what has a row of it"),
+    **dict.fromkeys(("marker", "linestyle"), "looks, the same for several"),
+    "color": "the one of its policy",
+}
+"""Fields without which a planner or search is another one, but whole, and why."""
+
+
+@pytest.mark.parametrize("name", PLANNERS)
+def test_a_planner_without_one_of_its_parts_is_named(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for field, less in without_a_field(PLANNERS[name]):
+        monkeypatch.setattr(planners, "PLANNERS", {name: less})
+        if field in CHOICES and not (field == "color" and not less.policy):
+            check_planners(POLICIES)
+            continue
+        named = "" if field == "name" else name
+        with pytest.raises(InputError, match=rf"^planners\.py: planner {named}, {field}: "):
+            check_planners(POLICIES)
+
+
+@pytest.mark.parametrize("name", SEARCHES)
+def test_a_search_without_one_of_its_parts_is_named(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    planner = next((one.name for one in PLANNERS.values() if one.search == name), None)
+    for field, less in without_a_field(SEARCHES[name]):
+        monkeypatch.setattr(planners, "SEARCHES", {**SEARCHES, name: less})
+        if field in CHOICES or (field == "follows_policy" and planner is None):
+            continue
+        where = f"planner {planner}, policy" if field == "follows_policy" else f"search {name}"
+        with pytest.raises(InputError, match=rf"^planners\.py: {where}"):
+            check_planners(POLICIES)
+
+
+@pytest.mark.parametrize("which", ["printed", "headline"])
+def test_the_planner_that_tables_speak_of_is_one(
+    which: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(planners, "TABLE_3", {})
+    with pytest.raises(InputError, match=rf"planners\.py: PLANNERS: none is {which}"):
+        planners.the_one(which, lambda planner: getattr(planner, which))
+
+
+@pytest.mark.parametrize("name", POLICIES)
+def test_a_policy_without_one_of_its_parts_is_named(name: str) -> None:
+    check_policies(list(POLICIES.values()))
+    for field, less in without_a_field(POLICIES[name]):
+        every = [less if one.name == name else one for one in POLICIES.values()]
+        with pytest.raises(InputError, match=rf"^polic.*, {field}: ") as error:
+            check_policies(every)
+        assert less.name in str(error.value) or field == "default"
+
+
 @pytest.mark.parametrize("search", sorted({planner.search for planner in PLANNERS.values()}))
 def test_a_missing_search_is_named_with_its_planner(
     search: str, monkeypatch: pytest.MonkeyPatch
@@ -324,23 +391,53 @@ def test_a_missing_search_is_named_with_its_planner(
         check_planners(POLICIES)
 
 
-def required_parts(name: str) -> list[tuple[str, ...]]:
-    """The fields without which no robot file is complete."""
-    document = yaml.safe_load((ROBOTS / f"{name}.yaml").read_text())
-    (arm, *_) = document["arms"]
-    own = [("arms", arm, field) for field in ("joints", "home", "tool", "hand_links")]
-    return [("description",), ("base_link",), ("arms",), *own]
+def parts_of(document: Any, way: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    """The keys and list entries of a robot file, but for the numbers of what is derived."""
+    if isinstance(document, dict | list):
+        for key in document if isinstance(document, dict) else range(len(document)):
+            yield (*way, key)
+            if key not in DERIVED:
+                yield from parts_of(document[key], (*way, key))
+
+
+DERIVED = {
+    *("palm_front", "hand_radius", "segments", "lever_arms", "metric", "spheres", "signs"),
+    *("spheres_between_arms", "gap", "lever", "grasp_width", "srdf"),
+}
+"""Fields of robot files that follow from the description where they are not stated."""
+DEFAULTS = {
+    **dict.fromkeys(("packages", "example-robot-data"), "found above the URDF as well"),
+    "acceleration": "2 per s, and a line says so",
+    "balanced": "no springs",
+    "force": "40 N",
+    "pad": "10 mm",
+    "offset": "none: the frame is the link's",
+    "left": "a robot with fewer arms",
+    "right": "a robot with fewer arms",
+    "pr2R": "a robot with fewer arms",
+    "ee_link": "a flange, as well a part of the arm",
+    "left_hand_link": "a flange",
+    "right_hand_link": "a flange",
+}
+"""What else a robot file may be without, and why."""
 
 
 @pytest.mark.parametrize("name", robot_names())
 def test_a_robot_file_without_one_of_its_parts_names_it(name: str, tmp_path: Path) -> None:
-    for *folders, field in required_parts(name):
-        document: dict[str, Any] = yaml.safe_load((ROBOTS / f"{name}.yaml").read_text())
+    text = (ROBOTS / f"{name}.yaml").read_text().replace("../", f"{ROBOTS.parent}/")
+    for *folders, last in parts_of(yaml.safe_load(text)):
+        document: Any = yaml.safe_load(text)
         part = document
         for folder in folders:
             part = part[folder]
-        del part[field]
-        file = tmp_path / f"{field}.yaml"
-        file.write_text(yaml.safe_dump(document))
-        with pytest.raises(InputError, match=field):
-            load_robot(str(file))
+        key = last if isinstance(last, str) else part[last]
+        del part[last]
+        file = tmp_path / f"{name}.yaml"
+        file.write_text(yaml.safe_dump(document, sort_keys=False))
+        if key in DERIVED or key in DEFAULTS:
+            read_robot(file)
+            continue
+        named = [word for word in (last, *folders) if isinstance(word, str)][:2]
+        with pytest.raises(InputError, match=rf"{name}\.yaml: .*({'|'.join(named)})") as error:
+            read_robot(file)
+        assert len(str(error.value).splitlines()) == 1

@@ -7,6 +7,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 import yaml
+from own_robot import describe, document, written
 
 from guided_lgp.errors import InputError
 from guided_lgp.poses import rotation_matrix
@@ -106,10 +107,11 @@ def test_signs_of_a_mirrored_arm_are_found(tmp_path: Path) -> None:
 
 
 def test_an_arm_that_is_no_mirror_image_is_named(tmp_path: Path) -> None:
-    arms = {"side": "l", "mirrors": "pr2L", "signs": None}
-    file = changed(tmp_path, "pr2", "pr2R", **arms)
-    with pytest.raises(InputError, match=r"arms.pr2R.mirrors: is no mirror image of pr2L"):
-        load_robot(str(file))
+    describe(tmp_path, "a", "b")
+    content = document("a", "b")
+    content["arms"]["bhand"] = {"side": "b", "mirrors": "ahand"}
+    with pytest.raises(InputError, match=r"arms\.bhand\.mirrors: is no mirror image of ahand"):
+        read_robot(Path(written(tmp_path, content)))
 
 
 def test_soft_limits_count_unless_the_file_says_otherwise(tmp_path: Path) -> None:

@@ -3,7 +3,7 @@
 A new policy is one package with ``DECLARATIONS`` in its ``__init__.py``; nothing else names it.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
 from pkgutil import iter_modules
@@ -22,7 +22,40 @@ def _declared() -> Mapping[str, PolicyDeclaration]:
     """Those of all packages, in the order of their names and of their declarations."""
     packages = sorted(found.name for found in iter_modules(policy.__path__) if found.ispkg)
     modules = [import_module(f"{policy.__name__}.{name}") for name in packages]
-    return {entry.name: entry for module in modules for entry in module.DECLARATIONS}
+    declared = [entry for module in modules for entry in module.DECLARATIONS]
+    check_policies(declared)
+    return {entry.name: entry for entry in declared}
+
+
+def check_policies(declared: Sequence[PolicyDeclaration]) -> None:
+    """Refuse a policy that lacks a part, or has one that is another's.
+
+    Raises:
+        InputError: the first fault, with the policy and the part.
+    """
+    for one in declared:
+        _check_parts(one)
+        for other in declared:
+            if other is not one:
+                _check_own(one, other)
+    if sum(one.default for one in declared) != 1:
+        raise InputError("policies, default", "is not one of them", "one")
+
+
+def _check_parts(one: PolicyDeclaration) -> None:
+    needed = ["name", "label", "summary", "color"]
+    needed += ["stage", "networks"] if one.stage or one.networks else []
+    for part in needed:
+        if not getattr(one, part):
+            raise InputError(f"policy {one.name!r}, {part}", "is missing")
+
+
+def _check_own(one: PolicyDeclaration, other: PolicyDeclaration) -> None:
+    for part in ("name", "label", "color"):
+        if getattr(one, part) == getattr(other, part):
+            raise InputError(f"policy {one.name!r}, {part}", f"is that of {other.name!r}, too")
+    if one.folder == other.folder and {*one.networks} & {*other.networks}:
+        raise InputError(f"policy {one.name!r}, folder", f"has the files of {other.name!r}, too")
 
 
 POLICIES = _declared()

@@ -90,7 +90,34 @@ def _check(document: RobotDocument, description: Description) -> None:
         if arm.segments is not None:
             description.require_links(f"{where}.segments.ends", *arm.segments.ends)
         description.require_links(f"{where}.spheres", *(arm.spheres or ()))
+        _check_hand(where, arm, description)
+    _check_joints(document, description)
     _ = description.disabled_pairs
+
+
+def _check_hand(where: str, arm: ArmDocument, description: Description) -> None:
+    """That the hand has all that its fingers move, and what they hang on."""
+    for joint in arm.fingers.joints:
+        palm = description.parents[description.children[joint]]
+        for link in (palm, *description.solid_links_below(joint)):
+            if link in description.solid_links and link not in arm.hand_links:
+                field = f"{description.where}: {where}.hand_links"
+                raise InputError(field, f"lack {link}, which {joint} moves or hangs on")
+
+
+def _check_joints(document: RobotDocument, description: Description) -> None:
+    """That every joint that moves a hand has one place in the file."""
+    known = {fixed.joint: f"fixed_joints.{name}" for name, fixed in document.fixed_joints.items()}
+    for gripper, arm in document.arms.items():
+        for field, joints in (("joints", arm.joints), ("fingers.joints", arm.fingers.joints)):
+            where = f"arms.{gripper}.{field}"
+            for joint in joints:
+                if known.setdefault(joint, where) != where:
+                    fault = f"{joint} is in {known[joint]}, too"
+                    raise InputError(f"{description.where}: {where}", fault, "a joint of its own")
+    for gripper, arm in document.arms.items():
+        description.require_known("fixed_joints", known, arm.tool.link)
+        description.require_known(f"arms.{gripper}.fingers.joints", known, *arm.hand_links)
 
 
 def _arm(

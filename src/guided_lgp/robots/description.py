@@ -4,7 +4,7 @@ import copy
 import json
 import os
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cached_property
@@ -179,16 +179,30 @@ class Description:
         Raises:
             InputError: they do not.
         """
-        carrier = {child: joint for joint, child in self.children.items()}
-        way = []
-        above = link
-        while above in self.parents:
-            way.append(carrier[above])
-            above = self.parents[above]
-        turning = [joint for joint in reversed(way) if joint in self.joints]
+        turning = self.joints_above(link)
         if [joint for joint in turning if joint in joints] != list(joints):
             fault = f"{', '.join(joints)} do not carry {link} one after the other"
             raise InputError(f"{self.where}: {field}", fault, ", ".join(turning))
+
+    def require_known(self, field: str, joints: Container[str], *links: str) -> None:
+        """Check that all joints that move some links are among those that a file names.
+
+        Raises:
+            InputError: the first that is not.
+        """
+        for link in links:
+            for joint in self.joints_above(link):
+                if joint not in joints:
+                    raise InputError(f"{self.where}: {field}", f"lack {joint}, which moves {link}")
+
+    def joints_above(self, link: str) -> list[str]:
+        """The joints that move a link, from the root on."""
+        carrier = {child: joint for joint, child in self.children.items()}
+        way = []
+        while link in self.parents:
+            way.append(carrier[link])
+            link = self.parents[link]
+        return [joint for joint in reversed(way) if joint in self.joints]
 
     def solid_links_below(self, joint: str) -> tuple[str, ...]:
         """Links with collision geometry that a joint moves."""

@@ -4,7 +4,7 @@ The experiments, the report, the command line and :func:`guided_lgp.plan` take t
 here. Nothing heavy is imported before a search is called.
 """
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING
@@ -265,18 +265,26 @@ GUIDED = tuple(name for name, planner in TABLE_3.items() if planner.trained)
 """Of these, the ones with one."""
 
 
-def _only(planners: Iterable[Planner]) -> Planner:
-    (planner,) = planners
-    return planner
+def the_one(which: str, fits: Callable[[Planner], object]) -> Planner:
+    """The planner of the comparison of scalability that fits.
+
+    Raises:
+        InputError: none does, or more than one.
+    """
+    found = [planner for planner in TABLE_3.values() if fits(planner)]
+    if len(found) != 1:
+        names = ", ".join(planner.name for planner in found) or "none"
+        raise InputError("planners.py: PLANNERS", f"{names} is {which}", "one planner")
+    return found[0]
 
 
-BASELINE = _only(planner for planner in TABLE_3.values() if planner.printed and not planner.policy)
+BASELINE = the_one("printed without a policy", lambda one: one.printed and not one.policy)
 """What the paper compares itself with."""
-PAPERS = _only(planner for planner in TABLE_3.values() if planner.printed and planner.policy)
+PAPERS = the_one("printed with a policy", lambda one: one.printed and one.policy)
 """What the paper proposes, with its figures."""
-CONTROL = _only(planner for planner in TABLE_3.values() if planner.policy == UNIFORM)
+CONTROL = the_one("the uniform policy's", lambda one: one.policy == UNIFORM)
 """What best-first search owes to itself."""
-BEST = _only(planner for planner in TABLE_3.values() if planner.headline and planner.trained)
+BEST = the_one("a headline and trained", lambda one: one.headline and one.trained)
 """What this work has to show beside the paper's."""
 
 
@@ -292,16 +300,30 @@ TABLE_1 = {
 
 
 def check_planners(policies: Collection[str]) -> None:
-    """Refuse a row that names a search or a policy that nobody has declared.
+    """Refuse a search or a row that lacks a part, or names what nobody has declared.
 
     Raises:
-        InputError: names the row and what is known.
+        InputError: names the search or row, and what is known.
     """
+    for name, search in SEARCHES.items():
+        _require(f"planners.py: search {name}", search, "function", "summary")
     for planner in PLANNERS.values():
         where = f"planners.py: planner {planner.name}"
+        _require(where, planner, "name", "label")
         if planner.search not in SEARCHES:
             fault = f"{planner.search!r} is unknown"
             raise InputError(f"{where}, search", fault, ", ".join(SEARCHES))
         if planner.policy and planner.policy not in policies:
             fault = f"{planner.policy!r} is unknown"
             raise InputError(f"{where}, policy", fault, ", ".join(policies))
+        if bool(planner.policy) != SEARCHES[planner.search].follows_policy:
+            fault = f"is {planner.policy!r}, which {planner.search} does not follow"
+            raise InputError(f"{where}, policy", fault, ", ".join(policies))
+        if not planner.policy:
+            _require(where, planner, "color")
+
+
+def _require(where: str, declared: object, *parts: str) -> None:
+    for part in parts:
+        if not getattr(declared, part):
+            raise InputError(f"{where}, {part}", "is missing")
