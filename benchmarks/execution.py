@@ -74,7 +74,7 @@ def planned(length: int, number: int, wanted: Callable[[Scene, Skeleton], bool])
     """A random feasible sequence of setup a, planned; the same for everyone."""
     (scene,) = generate("a", 1, SEED + number, f"execution-{number:03d}").scenes
     rng = np.random.default_rng([SEED, length, number])
-    bounds = SceneBounds(scene, load_params(ROOT / PARAMS).bounds)
+    bounds = SceneBounds(scene, load_params(ROOT / PARAMS).bounds, firm=True)
     for _ in range(DRAWS):
         skeleton = _drawn(scene, length, rng)
         if wanted(scene, skeleton) and bounds.coarse(skeleton).feasible:

@@ -183,7 +183,7 @@ def plan(
     if (prefix or misplaced) and not SEARCHES[planner].over_sequences:
         accepted = ", ".join(name for name, search in SEARCHES.items() if search.over_sequences)
         raise InputError("planner", f"{planner} knows neither sequences nor places", accepted)
-    scene_bounds = SceneBounds(scene, params.bounds, deadline, goals)
+    scene_bounds = SceneBounds(scene, params.bounds, deadline, goals, firm=True)
     if finding := TaskFacts(scene_bounds, goals, misplaced).before_search():
         return _without_search(scene, goals, None, finding)
     search, followed = _guidance(planner, policy, models, scene)
@@ -246,7 +246,7 @@ class _Attempts:
             scene = widened_scene(problem.scene, problem.objective, params, problem.deadline)
         if scene is None:
             return None
-        bounds = SceneBounds(scene, params, problem.deadline, problem.objective)
+        bounds = SceneBounds(scene, params, problem.deadline, problem.objective, firm=True)
         knows = problem.policy and not missing_instructions(problem.policy, scene.symbols.domain)
         self._last = replace(
             problem,

@@ -128,7 +128,7 @@ def replan(
     validate_scene(scene, where)
     goals, rest = course.objective, course.skeleton[after:]
     params = params or load_planning()
-    bounds = SceneBounds(scene, params.bounds, Deadline.after(timeout), goals)
+    bounds = SceneBounds(scene, params.bounds, Deadline.after(timeout), goals, firm=True)
     for way in islice(_ways(scene.state, rest, goals, scene.symbols), TRIED):
         path = bounds.path(way) if way else stay(scene)
         if path.feasible:

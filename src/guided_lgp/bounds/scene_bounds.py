@@ -35,8 +35,13 @@ class SceneBounds:
         params: BoundsParams,
         deadline: Deadline = NEVER,
         objective: Objective = (),
+        firm: bool = False,
     ) -> None:
-        """Prepare a scene, for plans whose goals may say more than symbols."""
+        """Prepare a scene, for plans whose goals may say more than symbols.
+
+        ``firm`` ones take, of the motions of several coarse solutions, the first whose grips hold
+        what the hands carry, or else the best: the paper asks for any motion.
+        """
         check_terms(scene.symbols.domain)
         check_motions(scene.symbols.domain)
         self.scene = scene
@@ -44,7 +49,7 @@ class SceneBounds:
         self._coarse_bound = CoarseBound(
             scene, params.coarse_restarts, deadline=deadline, goals=self._goals
         )
-        self._path_solutions = params.path_solutions
+        self._path_solutions, self._firm = params.path_solutions, firm
         self._deadline = deadline
         self._parts = Parts(scene, _PATIENCE * params.coarse_restarts, self.facts, deadline)
         self._pairs = Pairs(scene, self._coarse_bound.solve, self._parts.solve)
@@ -103,5 +108,10 @@ class SceneBounds:
     def _path_bound(self) -> PathBound:
         """Built when first asked: most skeletons never get so far."""
         return PathBound(
-            self.scene, self._coarse_bound, self._path_solutions, self._deadline, self._goals
+            self.scene,
+            self._coarse_bound,
+            self._path_solutions,
+            self._deadline,
+            self._goals,
+            self._firm,
         )

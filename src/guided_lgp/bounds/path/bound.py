@@ -1,13 +1,15 @@
 """The path bound P(a_1:K): the dense motion for a whole skeleton (paper, eq. 4)."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import chain, islice
 
 from guided_lgp.bounds.coarse import CoarseBound
 from guided_lgp.bounds.deadline import NEVER, Deadline
 from guided_lgp.bounds.goals import NO_TERMS, GoalTerms
 from guided_lgp.bounds.path.assembly import assemble, stay
+from guided_lgp.bounds.path.firm import firmest
 from guided_lgp.bounds.path.grips import grips_of
 from guided_lgp.bounds.path.motions import Mover
 from guided_lgp.bounds.path.optimise import optimise
@@ -45,6 +47,7 @@ class PathBound:
         solutions: int,
         deadline: Deadline = NEVER,
         goals: GoalTerms = NO_TERMS,
+        firm: bool = False,
     ) -> None:
         """Prepare for one scene.
 
@@ -54,11 +57,13 @@ class PathBound:
             solutions: largest number of coarse solutions to try.
             deadline: after which it gives up.
             goals: terms that the motion keeps.
+            firm: whether to look for grips that hold what the hands carry.
         """
         self._scene = scene
         self._coarse = coarse
         self._solutions = solutions
         self._goals = goals
+        self._firm = firm
         self._mover = Mover(scene, _ITERATIONS, deadline)
         self._grips = {
             (gripper, box.name): grips_of(box, arm)
@@ -80,12 +85,21 @@ class PathBound:
             OutOfTimeError: the deadline has passed.
         """
         began = time.perf_counter()
-        skeleton = coarse_result.skeleton
         furthest = FurthestFailure()
+        motions = self._motions(coarse_result, furthest)
+        found = firmest(self._scene, motions) if self._firm else next(motions, None)
+        if found is None:
+            found = _failed(coarse_result.skeleton, furthest)
+        return replace(found, time_s=time.perf_counter() - began)
+
+    def _motions(
+        self, coarse_result: CoarseResult, furthest: FurthestFailure
+    ) -> Iterator[PathResult]:
+        """Verified motions, one from each coarse solution that has one."""
+        skeleton = coarse_result.skeleton
         others = self._coarse.solutions(skeleton, self._solutions)
-        tried = 0
         for number, solution in enumerate(islice(chain([coarse_result], others), self._solutions)):
-            tried = number + 1
+            furthest.tried = number + 1
             task = Task(
                 self._scene,
                 self._mover,
@@ -115,7 +129,7 @@ class PathBound:
                 fault = report.violation
                 furthest.record(fault.action, Stage.VERIFICATION, fault.constraint)
                 continue
-            return PathResult(
+            yield PathResult(
                 skeleton,
                 feasible=True,
                 trajectory=trajectory,
@@ -125,20 +139,7 @@ class PathBound:
                     "deepest_penetration_m": report.deepest_penetration,
                 },
                 steps=tuple(steps),
-                time_s=time.perf_counter() - began,
             )
-        failure = Failure(
-            max(furthest.action, 0),
-            furthest.constraint,
-            float("nan"),
-            f"{tried} coarse solutions with grips, postures and placements chosen anew",
-        )
-        return PathResult(
-            skeleton,
-            feasible=False,
-            failure=failure,
-            time_s=time.perf_counter() - began,
-        )
 
     def rest(self) -> PathResult:
         """The plan of no actions: arms go where goals want them."""
@@ -185,3 +186,13 @@ class PathBound:
             if self._mover.queries > limit or sampler.visits > _VISITS * (len(task) + 4):
                 return -1
         return sampler.backjump_target(index, situation, begun)
+
+
+def _failed(skeleton: Skeleton, furthest: FurthestFailure) -> PathResult:
+    failure = Failure(
+        max(furthest.action, 0),
+        furthest.constraint,
+        float("nan"),
+        f"{furthest.tried} coarse solutions with grips, postures and placements chosen anew",
+    )
+    return PathResult(skeleton, feasible=False, failure=failure)

@@ -72,6 +72,8 @@ class FurthestFailure:
     action: int = -1
     stage: int = -1
     constraint: str = "no motion found"
+    tried: int = 0
+    """Coarse solutions so far."""
 
     def record(self, action: int, stage: Stage, constraint: str) -> None:
         """Remember the obstacle unless one as far on is known."""
