@@ -3,8 +3,14 @@
 All functions broadcast over leading dimensions.
 """
 
+import ctypes
+from functools import cache
+from pathlib import Path
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from guided_lgp.compiled import address, load_compiled
 
 Array = NDArray[np.float64]
 
@@ -36,6 +42,13 @@ def compose(first: Array, second: Array) -> Array:
     """The pose ``first * second``: ``second`` is given in the frame of ``first``."""
     if first.ndim == second.ndim == 1:
         return np.array(_compose_two(first.tolist(), second.tolist()))
+    library = _library()
+    if library is not None:
+        shape = np.broadcast_shapes(first.shape, second.shape)
+        pair = (np.broadcast_to(transform, shape) for transform in (first, second))
+        arrays = [*(np.ascontiguousarray(array, dtype=float) for array in pair), np.empty(shape)]
+        library.compose(arrays[2].size // 7, *map(address, arrays))
+        return arrays[2]
     position = first[..., :3] + rotate(first[..., 3:], second[..., :3])
     return np.concatenate([position, multiply(first[..., 3:], second[..., 3:])], axis=-1)
 
@@ -69,7 +82,8 @@ def apply(transform: Array, points: Array) -> Array:
 
 def rotation_matrix(quaternion: Array) -> Array:
     """Rotation matrices (..., 3, 3) of unit quaternions (..., 4); columns are the body's axes."""
-    return np.stack([rotate(quaternion, axis) for axis in np.eye(3)], axis=-1)
+    axes = rotate(quaternion[..., None, :], np.eye(3))
+    return np.ascontiguousarray(np.swapaxes(axes, -1, -2))
 
 
 def quaternion(rotation: Array) -> Array:
@@ -109,4 +123,14 @@ def _cross(first: Array, second: Array) -> Array:
     """Cross product of vectors (..., 3): ``numpy.cross`` without its overhead."""
     a, b, c = first[..., 0], first[..., 1], first[..., 2]
     x, y, z = second[..., 0], second[..., 1], second[..., 2]
-    return np.stack([b * z - c * y, c * x - a * z, a * y - b * x], axis=-1)
+    product = np.empty(np.broadcast_shapes(first.shape, second.shape))
+    np.subtract(b * z, c * y, out=product[..., 0])
+    np.subtract(c * x, a * z, out=product[..., 1])
+    np.subtract(a * y, b * x, out=product[..., 2])
+    return product
+
+
+@cache
+def _library() -> ctypes.CDLL | None:
+    source = Path(__file__).with_name("poses.c").read_text(encoding="utf-8")
+    return load_compiled("poses", source)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guided_lgp.bounds.results import Array
-from guided_lgp.compiled import load_compiled
+from guided_lgp.compiled import address, load_compiled
 from guided_lgp.robots.kinematics import flat, moving_joints
 from guided_lgp.robots.measures.hulls import shape_vertices
 
@@ -101,14 +101,14 @@ class Certificate:
         free = np.zeros(len(values), dtype=np.bool_)
         if self._certify is not None:
             plain = np.ascontiguousarray(values[:, self._columns], dtype=np.float32)
-            arrays = plain, np.sin(plain), 1 - np.cos(plain), free
+            arrays = (plain, np.sin(plain), 1 - np.cos(plain), free)
             self._certify(
                 ctypes.byref(self._scene),
                 len(pairs),
-                ctypes.c_void_p(pairs.ctypes.data),
+                address(pairs),
                 ctypes.c_float(padding + _ROUNDING),
                 len(values),
-                *(ctypes.c_void_p(array.ctypes.data) for array in arrays),
+                *map(address, arrays),
             )
         return free
 

@@ -107,9 +107,11 @@ class CollisionChecker:
         self.entered: PlanningScene | None = None
         """The scene that is there."""
         self._pattern: _Pattern | None = None
-        self._patterns: dict[_Pattern, tuple[NDArray[np.bool_], list[int]]] = {}
+        self._patterns: dict[_Pattern, tuple[NDArray[np.bool_], list[int], NDArray[np.intc]]] = {}
         self._active: list[int] = []
         self._apart = np.empty((0, 2), dtype=np.intc)
+        self._placed: dict[str, tuple[str | None, bytes]] = {}
+        """Gripper, if any, and pose there of every box that was put somewhere."""
         self.queries = 0
         """Calls of :meth:`first_collision` so far."""
         self._template = pin.neutral(self._model)
@@ -138,7 +140,7 @@ class CollisionChecker:
         """What stands side by side at the start may be lifted off as near as it is."""
         standing = {box.name: box for box in scene.movable if box.name not in scene.held}
         for box in standing.values():
-            self._move(box.name, 0, pin.XYZQUATToSE3(box.placement))
+            self._put(box.name, None, box.placement)
         pin.updateGeometryPlacements(
             self._model, self._data, self._geometry, self._geometry_data, self._template
         )
@@ -159,10 +161,9 @@ class CollisionChecker:
         """
         self.entered = scene
         for box, placement in scene.standing.items():
-            self._move(box, 0, pin.XYZQUATToSE3(placement))
+            self._put(box, None, placement)
         for box, (gripper, grasp) in scene.carried.items():
-            joint, tool = self._tool[gripper]
-            self._move(box, joint, tool * pin.XYZQUATToSE3(grasp))
+            self._put(box, gripper, grasp)
         pattern = (
             scene.moving,
             frozenset(scene.standing),
@@ -172,10 +173,11 @@ class CollisionChecker:
         if pattern != self._pattern:
             if pattern not in self._patterns:
                 active = self._active_pairs(scene)
-                self._patterns[pattern] = active, np.flatnonzero(active[self._pairs]).tolist()
+                numbers = np.flatnonzero(active[self._pairs])
+                apart = np.stack(self._pairs, axis=1)[numbers].astype(np.intc)
+                self._patterns[pattern] = active, numbers.tolist(), apart
             self._pattern = pattern
-            active, self._active = self._patterns[pattern]
-            self._apart = np.stack(self._pairs, axis=1)[self._active].astype(np.intc)
+            active, self._active, self._apart = self._patterns[pattern]
             self._geometry_data.setActiveCollisionPairs(self._geometry, active, True)
 
     def _active_pairs(self, scene: PlanningScene) -> NDArray[np.bool_]:
@@ -243,10 +245,12 @@ class CollisionChecker:
     def free(self, moving: Array) -> NDArray[np.bool_]:
         """Which rows (m, joints) of all moving joints are free; coal decides what is not sure."""
         free = self.certified(moving)
-        for row in np.flatnonzero(~free):
-            fingers = self._robot.finger_values(moving[row])
-            q = moving[row, None, : len(self._robot.joint_names)]
-            free[row] = self._collision(self.coordinates(q, fingers)[0]) is None
+        unsure = np.flatnonzero(~free)
+        coordinates = self.coordinates(moving[unsure, : len(self._robot.joint_names)], {})
+        for gripper, hand in self._fingers.items():
+            values = moving[unsure, hand.slice.start, None] / hand.ratios[0]
+            coordinates[:, self._finger_at[gripper]] = values * hand.ratios
+        free[unsure] = [self._collision(row) is None for row in coordinates]
         return free
 
     def moving_joints(self, q: Array, fingers: Mapping[str, float]) -> Array:
@@ -317,12 +321,18 @@ class CollisionChecker:
         self._geometry.addGeometryObject(pin.GeometryObject(name, joint, placement, shape))
         self._names.append(name)
 
-    def _move(self, name: str, joint: int, placement: Any) -> None:
+    def _put(self, name: str, gripper: str | None, placement: Array) -> None:
+        """Put a box at a pose (7,), in the world or in a tool frame, unless it is there."""
+        place = gripper, placement.tobytes()
+        if self._placed.get(name) == place:
+            return
+        self._placed[name] = place
+        joint, tool = (0, pin.SE3.Identity()) if gripper is None else self._tool[gripper]
         (number,) = self._bodies[name]
         body = self._geometry.geometryObjects[number]
         body.parentJoint = joint
-        body.placement = placement
-        self._certificate.move(number, joint, placement.homogeneous)
+        body.placement = tool * pin.XYZQUATToSE3(placement)
+        self._certificate.move(number, joint, body.placement.homogeneous)
 
     def _shapes(self, *links: str) -> list[int]:
         """The collision shapes of links; a link may have any number of them."""
