@@ -176,7 +176,7 @@ class CoarseBound:
         kept = prefix if number == 0 or number % 2 else None
         generator = _generator(programs.skeleton, number)
         variant = Variant() if kept is None else kept.variant
-        variant = programs.variants.of(number, generator, variant)
+        variant = programs.variants.tried(number, generator, variant)
         formulation = programs.built(number, variant)
         start = self._starts.draw(
             formulation,

@@ -39,10 +39,10 @@ class Variants:
 
     def __init__(self, geometry: SceneGeometry, skeleton: Skeleton) -> None:
         grounds = [geometry.domain.bind(action) for action in skeleton]
-        self._sides = [_sides(geometry, ground) for ground in grounds]
-        self._low = list(_ways(geometry, grounds))
+        self._sides = [_side_count(geometry, ground) for ground in grounds]
+        self._low = list(_way_counts(geometry, grounds))
 
-    def of(self, number: int, generator: np.random.Generator, kept: Variant) -> Variant:
+    def tried(self, number: int, generator: np.random.Generator, kept: Variant) -> Variant:
         """What a start chooses.
 
         Args:
@@ -63,13 +63,13 @@ def _drawn(generator: np.random.Generator, counts: Sequence[int]) -> tuple[int, 
     return tuple(int(generator.integers(count)) if count > 1 else 0 for count in counts)
 
 
-def _sides(geometry: SceneGeometry, ground: GroundInstruction) -> int:
+def _side_count(geometry: SceneGeometry, ground: GroundInstruction) -> int:
     """On how many sides the grip that an action begins can close; 1 where none is, or it is new."""
     arm = geometry.scene.robot.description.arms.get(ground.parent)
     return 1 if arm is None else max(1, len(grasp_sides(geometry, ground.body, arm)))
 
 
-def _ways(geometry: SceneGeometry, grounds: Sequence[GroundInstruction]) -> Iterator[int]:
+def _way_counts(geometry: SceneGeometry, grounds: Sequence[GroundInstruction]) -> Iterator[int]:
     """How many straight ways every action's box has."""
     if not geometry.overhung:
         yield from [1] * len(grounds)
