@@ -151,6 +151,7 @@ def test_a_mesh_on_another_face() -> None:
         (odd(vertices=FRUSTUM, size=[0.1, 0.1, 0.1]), "a mesh has vertices, or the file"),
         (odd(shape="mesh", vertices=FRUSTUM[:4]), "the points do not enclose a body"),
         (odd(mesh="nowhere.stl"), r"there is no file nowhere\.stl"),
+        (odd(mesh="x" * 300), "there is no file x"),
         (odd(size=[0.1, 0.1, 0.1], quaternion=[0, 0, 0, 0.5]), "has length 1, not 0.5"),
         (odd(size=[0.1, 0.1, 0.1], quaternion=[0.3826834, 0, 0, 0.9238795]), "no flat face down"),
         (

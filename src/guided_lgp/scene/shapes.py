@@ -153,12 +153,19 @@ def read_mesh(path: Path) -> Array:
     """
     import coal  # heavy: only where a scene has a mesh
 
-    if not path.is_file():
+    if not _is_file(path):
         raise ValueError(f"there is no file {path}")
     try:
         return np.array(coal.MeshLoader().load(str(path), np.ones(3)).vertices())
     except (RuntimeError, ValueError):
         raise ValueError(f"{path} is no mesh that can be read") from None
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:  # the name is too long
+        return False
 
 
 def _centroid(triangles: Array, inside: Array) -> Array:
