@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from guided_lgp.bounds.checks import box_sizes
 from guided_lgp.bounds.coordination import Coordinator
 from guided_lgp.bounds.coordination.itinerary import Itinerary, itinerary
 from guided_lgp.bounds.coordination.law import TICK, jerk_limited, ramp
@@ -80,6 +81,25 @@ def test_arms_move_at_once(together: PathResult) -> None:
         for arm in PR2.arms.values()
     ]
     assert np.mean(moving[0] & moving[1]) > 0.5
+
+
+def test_the_hand_rests_while_its_fingers_are_near_the_body(
+    apart: tuple[Scene, PathResult], together: PathResult
+) -> None:
+    q, sizes = motion(together).q, box_sizes(apart[0])
+    for attachment in motion(together).attachments:
+        arm = PR2.arms[attachment.gripper]
+        values = q[:, arm.fingers.slice][:, 0]
+        opening = np.array([arm.fingers.opening(value) for value in values])
+        width = opening[attachment.start]
+        assert width == pytest.approx(sizes[attachment.box][1], abs=0.003)
+        clear = np.flatnonzero(opening > width + 0.008)
+        closing = clear[clear < attachment.start][-1]
+        opened = clear[clear > attachment.end][0]
+        assert not np.ptp(q[closing : attachment.start + 1, arm.slice], axis=0).any()
+        assert not np.ptp(q[attachment.end : opened + 1, arm.slice], axis=0).any()
+        assert np.ptp(q[closing - 1 : closing + 1, arm.slice], axis=0).any()
+        assert np.ptp(q[opened : opened + 2, arm.slice], axis=0).any()
 
 
 def test_the_same_plan_twice(apart: tuple[Scene, PathResult], together: PathResult) -> None:

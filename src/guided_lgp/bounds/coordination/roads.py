@@ -2,6 +2,8 @@
 
 Between two stops an arm goes straight on, without a rest where a straight way ends; or it waits at
 its side, or before the straight way in. Fingers move on the way, clear of what they leave and take.
+At a contact the hand rests while they are near the body: it comes as they begin to close, and
+leaves before they are wide open.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -24,6 +26,9 @@ _PATIENCE = 8
 """How often a motion is made slower until the fingers have time to move."""
 _SLOWER = 1.15
 """By what factor each time."""
+_OFF = 0.004
+"""Distance (m) of either finger from the body between them at which the hand may move; planning
+keeps 3 mm from everything."""
 
 
 class Place(IntEnum):
@@ -33,10 +38,9 @@ class Place(IntEnum):
     BEFORE = 1
     """Before the straight way in."""
     AT = 2
-    CLOSED = 3
-    """The fingers have closed."""
-    OPENED = 4
-    """They have opened."""
+    """The fingers that close have closed."""
+    OPENED = 3
+    """They have opened, where the arm stays."""
 
 
 @dataclass(frozen=True)
@@ -91,12 +95,7 @@ class Road:
         self._arm = mover.arms[gripper].arm
         self._stops = stops
         self._waits = waits
-        still = [np.zeros(len(stop.q)) for stop in stops]
-        turns = _turns(mover.arms[gripper], stops) if unwinds else still
-        self._gaps = [
-            Gap(mover, mover.arms[gripper], pair, np.stack(wound))
-            for pair, wound in zip(pairwise(stops), pairwise(turns), strict=True)
-        ]
+        self._gaps = _gaps(mover, mover.arms[gripper], stops, unwinds)
         self._edges: dict[Node, tuple[Edge, ...]] = {}
         self._remaining: dict[Node, float] = {}
         self.start = Node(0, Place.AT)
@@ -117,12 +116,12 @@ class Road:
 
     def over(self, node: Node) -> int:
         """The last stop that is over at a node."""
-        return node.stop if node.place >= self._effect(node.stop) else node.stop - 1
+        return node.stop if node.place >= Place.AT else node.stop - 1
 
     def action(self, node: Node) -> int | None:
         """The action that takes effect as the arm arrives at a node."""
         stop = self._stops[node.stop]
-        return stop.contact if stop.acts and node.place == self._effect(node.stop) else None
+        return stop.contact if stop.acts and node.place == Place.AT else None
 
     def contacts(self, node: Node) -> frozenset[int]:
         """The action whose contact is at a node."""
@@ -131,19 +130,12 @@ class Road:
 
     def is_end(self, node: Node) -> bool:
         """Whether the arm stays there."""
-        return node.stop == len(self._stops) - 1 and node.place == self._last(node.stop)
+        last = Place.AT if self._stops[-1].opening is None else Place.OPENED
+        return node == Node(len(self._stops) - 1, last)
 
     def rest(self, node: Node) -> tuple[Array, float]:
         """Joints (n,) and fingers at a node that a motion has led to, or at the start."""
         return self._rests[node]
-
-    def _effect(self, stop: int) -> Place:
-        """Where a stop is over but for what follows from it."""
-        return Place.AT if self._stops[stop].closing is None else Place.CLOSED
-
-    def _last(self, stop: int) -> Place:
-        """Where an arm is when all is done at a stop."""
-        return self._effect(stop) if self._stops[stop].opening is None else Place.OPENED
 
     def _found(self, node: Node) -> Iterator[Edge]:
         stop = self._stops[node.stop]
@@ -151,25 +143,19 @@ class Road:
             yield from self._arriving(node, self._gaps[node.stop - 1].from_side, {})
         elif node.place == Place.BEFORE:
             into = self._gaps[node.stop - 1].into
-            way = Way((into,), len(into), 0)
-            yield from self._moving(node, Place.AT, way, stop.way_in_after)
-        elif node.place < self._effect(node.stop):
-            assert stop.closing is not None
-            yield self._resting(node, Place.CLOSED, stop.fingers, stop.closing, {})
-        elif node.place < self._last(node.stop):
-            assert stop.opening is not None
-            held = stop.fingers if stop.closing is None else stop.closing
-            yield self._resting(node, Place.OPENED, held, stop.opening, stop.open_after)
-        elif not self.is_end(node):
+            yield from self._moving(node, Place.AT, Way((into,), len(into), 0), stop.way_in_after)
+        elif node.stop < len(self._stops) - 1:
             yield from self._leaving(node)
+        elif not self.is_end(node):
+            yield self._opening(node)
 
     def _leaving(self, node: Node) -> Iterator[Edge]:
         """Straight on, or to the arm's side."""
-        gap, needs = self._gaps[node.stop], self._stops[node.stop].leave_after
-        ahead = Node(node.stop + 1, Place.SIDE)
+        gap, stop = self._gaps[node.stop], self._stops[node.stop]
+        needs = {**stop.open_after, **stop.leave_after}
         yield from self._arriving(node, gap.direct, needs)
         if self._waits and gap.to_side is not None:
-            yield from self._moving(node, ahead.place, gap.to_side, needs)
+            yield from self._moving(node, Place.SIDE, gap.to_side, needs)
 
     def _arriving(self, node: Node, way: Way | None, needs: Mapping[str, int]) -> Iterator[Edge]:
         """A way to the next stop, and the same with a rest before the straight way in."""
@@ -186,21 +172,57 @@ class Road:
     def _moving(
         self, node: Node, place: Place, way: Way, needs: Mapping[str, int]
     ) -> Iterator[Edge]:
-        """The arm moves, and the fingers to what they have to be at the stop."""
+        """The arm moves, and the fingers with it."""
         end = Node(node.stop if node.place < Place.AT else node.stop + 1, place)
-        stop = self._stops[end.stop]
-        start = stop.fingers if node.place == Place.BEFORE else self._fingers(end.stop - 1)
-        values = ramp(self._arm.fingers, start, start if place == Place.SIDE else stop.fingers)
-        slower = _CAREFUL if stop.careful else 1.0
+        fingers = self._finger_ways(node, end)
+        slower = _CAREFUL if self._stops[end.stop].careful else 1.0
         for _ in range(_PATIENCE):
             q = self._timed(way, slower)
-            first, last = self._between(way, q)
-            if last - first >= len(values) - 1:
-                row = last - len(values) + 1
-                fingers = np.pad(values, (row, len(q) - row - len(values)), mode="edge")
-                yield self._edge(node, end, q, fingers, needs)
+            free = self._between(way, q)
+            if free[1] - free[0] >= len(fingers[1]) - 1:
+                yield self._edge(node, end, *self._together(q, free, *fingers), needs)
                 return
             slower *= _SLOWER
+
+    def _finger_ways(self, start: Node, end: Node) -> tuple[Array, Array, Array]:
+        """How the fingers open at the start, move on the way, and close at the end."""
+        stop, opening = self._stops[end.stop], self._opening_from(start)
+        wanted = opening[-1] if end.place == Place.SIDE else stop.fingers
+        closed = stop.closing if end.place == Place.AT else None
+        between = ramp(self._arm.fingers, opening[-1], wanted)
+        closing = ramp(self._arm.fingers, wanted, wanted if closed is None else closed)
+        return opening, between, closing
+
+    def _together(
+        self, q: Array, free: tuple[int, int], opening: Array, between: Array, closing: Array
+    ) -> tuple[Array, Array]:
+        """Rows of the arm and of the fingers: they move on the free way; on the straight ways, and
+        before and after, they do so while the hand is at the body.
+        """
+        first, last = free
+        lead = len(opening) - 1 - min(self._clear(opening[::-1]), first)
+        reached = lead + len(q) - 1 - min(self._clear(closing), len(q) - 1 - last)
+        rest = reached + len(closing) - lead - len(q)
+        values = _joined(
+            (0, opening), (lead + last - len(between) + 1, between), (reached, closing)
+        )
+        return np.pad(q, ((lead, rest), (0, 0)), mode="edge"), values
+
+    def _opening_from(self, node: Node) -> Array:
+        """How the fingers (T,) leave what they have held; one value where they only go on."""
+        stop = self._stops[node.stop]
+        if node.place == Place.BEFORE:
+            return np.array([stop.fingers])
+        if node.place == Place.SIDE:
+            return np.array([self._rests[node][1]])
+        held = stop.fingers if stop.closing is None else stop.closing
+        return ramp(self._arm.fingers, held, held if stop.opening is None else stop.opening)
+
+    def _clear(self, values: Array) -> int:
+        """The rows (of T,) after the first one until fingers that close are near the body."""
+        openings = [self._arm.fingers.opening(float(value)) for value in values]
+        near = np.array(openings) / 2 < openings[-1] / 2 + _OFF
+        return max(int(np.argmax(near)) - 1, 0)
 
     def _timed(self, way: Way, slower: float) -> Array:
         """The rows of a way, at least two."""
@@ -215,13 +237,12 @@ class Road:
         into = _lengths(way.pieces[-1][len(way.pieces[-1]) - way.into :], self._arm)[-1:].sum()
         return int(np.argmax(gone >= out)), len(q) - 1 - int(np.argmax(left[::-1] >= into))
 
-    def _resting(
-        self, node: Node, place: Place, start: float, end: float, needs: Mapping[str, int]
-    ) -> Edge:
-        """Fingers move while the arm rests."""
-        values = ramp(self._arm.fingers, start, end)
-        q = np.tile(self._gaps[node.stop - 1].end, (len(values), 1))
-        return self._edge(node, Node(node.stop, place), q, values, needs)
+    def _opening(self, node: Node) -> Edge:
+        """Fingers open where the arm stays."""
+        values = self._opening_from(node)
+        q = np.tile(self._rests[node][0], (len(values), 1))
+        needs = self._stops[node.stop].open_after
+        return self._edge(node, Node(node.stop, Place.OPENED), q, values, needs)
 
     def _edge(
         self, start: Node, end: Node, q: Array, fingers: Array, needs: Mapping[str, int]
@@ -231,17 +252,32 @@ class Road:
         self._rests[end] = q[-1], float(fingers[-1])
         return Edge(end, q, fingers, self.over(start), needs, after, contacts)
 
-    def _fingers(self, number: int) -> float:
-        """Where they are when the arm leaves a stop."""
-        stop = self._stops[number]
-        values = (stop.opening, stop.closing, stop.fingers)
-        return next(value for value in values if value is not None)
+
+def _joined(*parts: tuple[int, Array]) -> Array:
+    """Values (T,) of parts that begin at rows, the last value of each until the next."""
+    values = np.empty(parts[-1][0] + len(parts[-1][1]))
+    for row, part in parts:
+        values[row : row + len(part)], values[row + len(part) :] = part, part[-1]
+    return values
 
 
 def _lengths(q: Array, arm: Arm) -> Array:
     """How far (T,) an arm has moved along configurations (T, n), in m."""
     steps = np.sum(np.abs(np.diff(q, axis=0)) * arm.metric, axis=1)
     return np.concatenate([[0.0], np.cumsum(steps)])[: len(q)]
+
+
+def _gaps(mover: Mover, arm: PlacedArm, stops: Sequence[Stop], unwinds: bool) -> list[Gap]:
+    """What is between the stops; joints unwind if the arm finds all its ways then."""
+    pairs = list(pairwise(stops))
+    still = [Gap(mover, arm, pair, np.zeros((2, len(pair[0].q)))) for pair in pairs]
+    if not unwinds:
+        return still
+    turned = [
+        Gap(mover, arm, pair, np.stack(turns)) if np.any(turns) else gap
+        for pair, turns, gap in zip(pairs, pairwise(_turns(arm, stops)), still, strict=True)
+    ]
+    return turned if all(gap.direct for gap in turned if gap not in still) else still
 
 
 def _turns(arm: PlacedArm, stops: Sequence[Stop]) -> list[Array]:
