@@ -7,7 +7,7 @@ from pathlib import Path
 
 import guided_lgp
 from guided_lgp.bounds.terms import term_names
-from guided_lgp.search.facts import KINDS
+from guided_lgp.search.finding import KINDS
 from guided_lgp.search.result import REASONS
 
 SOURCES = Path(guided_lgp.__file__).parent / "bounds"

@@ -41,7 +41,8 @@ from guided_lgp.scene.contradictions import check_places
 from guided_lgp.scene.goals import complete_objective, in_the_way
 from guided_lgp.scene.validate import validate_scene
 from guided_lgp.scene.world import initial_poses
-from guided_lgp.search.facts import Finding, TaskFacts
+from guided_lgp.search.facts import TaskFacts
+from guided_lgp.search.finding import Finding
 from guided_lgp.search.given import read_skeleton
 from guided_lgp.search.planners import (
     DEFAULT_SEARCH,

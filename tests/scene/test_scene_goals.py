@@ -60,9 +60,10 @@ def test_what_stands_where_a_box_is_wanted() -> None:
         ("(at red 0.5 -0.3 0.65 0) (at red 0.6 -0.3 0.65 0)", "red is in one place only"),
         ("(at red 0.5 -0.3 0.65 0) (at red 0.5 -0.3 0.65 1)", "red is in one place only"),
         ("(at red 0.5 -0.3 0.65 0) (at blue 0.52 -0.3 0.65 1)", "red and blue would be in each"),
-        ("(in red tab2 0 0 0.1 0.1) (in red tab2 -0.1 -0.1 0 0)", "red is in one place only"),
+        ("(in red tab2 0 0 0.16 0.16) (in red tab2 -0.16 -0.16 0 0)", "red is in one place only"),
         ("(at red 0.5 -0.3 0.65 0) (in red tab2 0.1 0.1 0.3 0.3)", "red is in one place only"),
         ("(in red tab2 0 0 0.05 0.3)", r"no room for red \(accepted: 0.070 m or more"),
+        ("(in red tab2 0 0 0.1 0.1)", r"no room for red \(accepted: room for 0.150 by 0.070 m"),
         ("(in red tab2 0.4 0 0.6 0.2)", "the region is beside tab2"),
     ],
 )

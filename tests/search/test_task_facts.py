@@ -11,7 +11,8 @@ from guided_lgp.logic import parse_objective, parse_skeleton
 from guided_lgp.params import load_planning
 from guided_lgp.scene import Box, Scene, load_scene, parse_scene
 from guided_lgp.scene.bodies import Obstacle
-from guided_lgp.search.facts import KINDS, Finding, TaskFacts
+from guided_lgp.search.facts import TaskFacts
+from guided_lgp.search.finding import KINDS, Finding
 
 ROOT = Path(__file__).parents[2]
 NEAR = load_scene(ROOT / "examples" / "three_boxes.json")

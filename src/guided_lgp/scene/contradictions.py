@@ -67,8 +67,18 @@ class _Place:
             frame = pose(self.support.position, self.support.yaw)
             middle, tolerance = apply(inverse(frame), self.centre)[:2], self.numbers["tolerance"]
             return middle - tolerance, middle + tolerance
-        low, high = (np.array([self.numbers[f"{axis}{end}"] for axis in "xy"]) for end in (0, 1))
+        low, high = self._corners()
         return low + inner_radius(self.body), high - inner_radius(self.body)
+
+    @property
+    def region(self) -> Array:
+        """Extents (2,) of the region (m)."""
+        low, high = self._corners()
+        return high - low
+
+    def _corners(self) -> tuple[Array, Array]:
+        low, high = (np.array([self.numbers[f"{axis}{end}"] for axis in "xy"]) for end in (0, 1))
+        return low, high
 
 
 def _places(objective: Objective, scene: Scene) -> Iterator[_Place]:
@@ -89,11 +99,25 @@ def _check_room(place: _Place) -> None:
     if np.any(high < low - MARGIN):
         accepted = f"{2 * inner_radius(place.body):.3f} m or more either way"
         raise InputError(f"goal {place.goal}", f"no room for {place.body.name}", accepted)
+    length, width = sorted(place.body.size[:2], reverse=True)
+    if place.body.shape == "box" and not place.is_pose and not _fits(length, width, place.region):
+        accepted = f"room for {length:.3f} by {width:.3f} m, turned in any way"
+        raise InputError(f"goal {place.goal}", f"no room for {place.body.name}", accepted)
     rest = np.array(place.support.convex.rest) + inner_radius(place.body)
     if np.any(low > rest) or np.any(high < -rest):
         accepted = "from the middle of its top, up to ({:.3f}, {:.3f}) m".format(*rest)
         fault = f"the region is beside {place.support.name}"
         raise InputError(f"goal {place.goal}", fault, accepted)
+
+
+def _fits(length: float, width: float, region: Array) -> bool:
+    """Whether a rectangle fits into another one, turned in any way (Carver, 1957)."""
+    short, long = sorted(region + MARGIN)
+    if length <= long:
+        return bool(width <= short)
+    square = length**2 + width**2
+    across = math.sqrt(square - long**2)
+    return bool(short * square >= 2 * length * width * long + (length**2 - width**2) * across)
 
 
 def _contradiction(one: _Place, other: _Place) -> str | None:

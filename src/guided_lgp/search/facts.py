@@ -5,9 +5,8 @@ coarse bound about small parts of the scene.
 """
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 
@@ -35,39 +34,14 @@ from guided_lgp.scene.footprints import footprint, gap, inner_radius, inset, sea
 from guided_lgp.scene.grasps import is_held_flat
 from guided_lgp.scene.tolerances import MARGIN
 from guided_lgp.search.conflicts import Conflicts
+from guided_lgp.search.finding import Finding
 from guided_lgp.search.lengths import too_far
 from guided_lgp.search.surroundings import barriers
-
-Kind = Literal["width", "reach", "room", "way", "blocked", "part", "posture"]
-
-KINDS: dict[Kind, str] = {
-    "width": "too wide for the fingers",
-    "reach": "out of reach",
-    "room": "no room",
-    "way": "no arm for the whole way",
-    "blocked": "neighbours in the way",
-    "part": "no solution even alone",
-    "posture": "no motion found to the posture",
-}
-"""What may be found, in the words of the glossary."""
 
 _FINGERS = 0.03
 """Gap (m) between boxes into which no finger fits."""
 _ROUNDING = 1e-6
 """By how much (m) numbers of a scene that should be the same may differ."""
-
-
-@dataclass(frozen=True)
-class Finding:
-    """Why a goal cannot be reached, and what would help."""
-
-    kind: Kind
-    text: str
-    help: str
-
-    def document(self) -> dict[str, str]:
-        """The JSON document."""
-        return vars(self)
 
 
 class TaskFacts:
@@ -279,7 +253,7 @@ class TaskFacts:
         """Why no arm takes a body that is alone with what stands still."""
         fixed = barriers(body, self._takings(body), self.scene, self._deadline)
         if not fixed:
-            text = f"{self._every_arm} fail to grasp {body} there, even alone in the scene"
+            text = f"{self._every_arm} fail to grasp {body} there, {self._even_alone(body)}"
             return Finding("reach", text, f"move {body} or the robot, or a smaller {body}")
         several = ", ".join(fixed)
         text = f"{several} around {body}: {self._every_arm} fail to grasp it, even as the only box"
@@ -290,10 +264,8 @@ class TaskFacts:
 
         Of a body in a hand, that one.
         """
-        if (holder := self._state.holder(body)) is not None:
-            return (holder,)
-        takings = self._takings(body)
-        return tuple(action.symbols[0] for action in takings if self._alone((action,)))
+        held = self._held(body)
+        return tuple(gripper for gripper, taking, _ in held if not taking or self._alone(taking))
 
     def reachable_by(self, body: str, support: str) -> tuple[str, ...]:
         """The grippers that can take a body and put it on a support, alone with its stack."""
@@ -323,9 +295,15 @@ class TaskFacts:
         yield Finding(
             "way",
             f"{body} can be taken by {arms}, which cannot put it on {names}, "
-            "even alone in the scene",
+            f"{self._even_alone(body)}",
             f"furniture between, which both arms reach{takes}; or move {names} or the robot",
         )
+
+    def _even_alone(self, body: str) -> str:
+        """What is left in the scene where a body is looked at, in words."""
+        above = sorted(self._state.carried_by(body))
+        several = f"with {' and '.join([body, *above])} " if above else ""
+        return f"even {several}alone in the scene"
 
     def _further_instructions(self) -> str:
         """What a domain that extends that of the scene would add, in words."""
