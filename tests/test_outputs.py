@@ -1,14 +1,17 @@
 """Files that a command is to write are refused before it plans."""
 
 import os
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import pytest
 
-from guided_lgp.cli.outputs import destinations
+from guided_lgp import cli
+from guided_lgp.cli.outputs import destinations, named_files
 from guided_lgp.errors import InputError
+from guided_lgp.paths import EXAMPLES
 
 SOMEBODY = 54322
 
@@ -87,3 +90,32 @@ def test_links_are_followed_and_streams_are_accepted(tmp_path: Path) -> None:
     null = Path("/dev/null")
     assert destinations({"--out": null, "--html": null}, []) == {"--out": null, "--html": null}
     assert destinations({"--out": None, "--html": Path("-")}, [])["--html"] == Path("-")
+
+
+def test_what_a_scene_names_is_not_overwritten(tmp_path: Path) -> None:
+    mesh, robot = tmp_path / "wedge.obj", tmp_path / "own.yaml"
+    mesh.touch()
+    robot.touch()
+    boxes = [{"name": "red"}, {"mesh": "wedge.obj"}, {"mesh": "x" * 300}, {"mesh": 1}]
+    document = {"robot": {"model": str(robot)}, "boxes": boxes}
+    named = list(named_files(document, tmp_path))
+    for file in (mesh, robot):
+        assert "is read by this command" in refused(file, None, *named)
+    assert destinations({"--out": tmp_path / "red"}, named)
+
+
+def test_given_actions_and_a_scene_are_not_overwritten(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    actions, scene = tmp_path / "actions", tmp_path / "domain.pddl"
+    actions.write_text("(grasp pr2L red)")
+    shutil.copy(EXAMPLES / "three_boxes.json", scene)
+    for command in (
+        ["plan", str(scene), "--skeleton", str(actions), "--out", str(actions)],
+        ["pddl", str(scene), "--goal", "(on red green)", "--folder", str(tmp_path)],
+    ):
+        with pytest.raises(SystemExit) as ended:
+            cli.main(command)
+        assert ended.value.code == 2
+        assert "is read by this command" in capsys.readouterr().err
+    assert actions.read_text() == "(grasp pr2L red)"

@@ -73,14 +73,21 @@ def test_a_pipe_is_read_once(command: str, tmp_path: Path) -> None:
     )
 
 
-def test_a_full_disk_is_said_in_one_line(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize(
+    ("number", "line"),
+    [
+        (errno.ENOSPC, "output: cannot be written: No space left on device"),
+        (errno.ENAMETOOLONG, "output: File name too long (accepted: a file)"),
+    ],
+)
+def test_what_a_user_can_mend_is_one_line(
+    number: int, line: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def full(*_: object) -> None:
-        raise OSError(errno.ENOSPC, "No space left on device")
+    def fail(*_: object) -> None:
+        raise OSError(number, os.strerror(number))
 
-    monkeypatch.setattr("guided_lgp.schemas.schema", full)
+    monkeypatch.setattr("guided_lgp.schemas.schema", fail)
     with pytest.raises(SystemExit) as ended:
         cli.main(["schema", "params"])
     assert ended.value.code == 2
-    assert capsys.readouterr().err == "error: output: cannot be written: No space left on device\n"
+    assert capsys.readouterr().err == f"error: {line}\n"

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from guided_lgp.cli.outputs import destinations
+from guided_lgp.cli.outputs import destinations, named_files
 from guided_lgp.cli.terminal import PlanFile, is_plan, read_scene_or_plan
 from guided_lgp.documents import copy_whole, write_text
 from guided_lgp.errors import InputError
@@ -89,6 +89,8 @@ def pddl(
         "problem.pddl": problem_text(start.state, objective, start.symbols),
     }
     for name, text in texts.items():
+        if (folder / name).exists():
+            destinations({"FOLDER": folder / name}, [scene])
         write_text(folder / name, text)
         typer.echo(f"written: {folder / name}")
 
@@ -150,8 +152,9 @@ def view(
     from guided_lgp.scene import parse_scene
     from guided_lgp.scene.validate import validate_scene
 
-    target = destinations({"--rerun": rerun}, [file])["--rerun"]
     document = read_scene_or_plan(file)
+    inputs = [file, *named_files(document, file.parent)]
+    target = destinations({"--rerun": rerun}, inputs)["--rerun"]
     found = parse_plan(document, str(file)) if is_plan(document) else None
     scene = found.scene if found else parse_scene(document, str(file), file.parent)
     validate_scene(scene, str(file))

@@ -2,16 +2,20 @@
 
 import os
 import stat
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 from guided_lgp.documents import STANDARD_OUTPUT, is_stream
 from guided_lgp.errors import InputError
 
+_NAMING = ("mesh", "model")
+"""Fields of a scene that can name a file."""
+
 
 def destinations(
-    options: Mapping[str, Path | None], inputs: Sequence[Path]
+    options: Mapping[str, Path | None], inputs: Iterable[Path]
 ) -> dict[str, Path | None]:
     """Where the files of a command go: symbolic links are followed.
 
@@ -23,15 +27,34 @@ def destinations(
         InputError: a file cannot be written, is one of the inputs, or is named twice.
     """
     found: dict[str, Path | None] = {}
+    read = list(inputs)
     for option, file in options.items():
         target = None if file is None else _destination(f"{option} {file}", file)
         if target is not None:
-            _require_no_input(f"{option} {file}", target, inputs)
+            _require_no_input(f"{option} {file}", target, read)
             for other, taken in found.items():
                 if taken == target and not target.is_char_device():
                     raise InputError(f"{option} {file}", f"is also the file of {other}")
         found[option] = target
     return found
+
+
+def named_files(document: Any, folder: Path) -> Iterator[Path]:
+    """The files that a scene names: its meshes and its robot's.
+
+    Args:
+        document: what was read, whether it is a scene or not.
+        folder: where it was.
+    """
+    rest = [document]
+    while rest:
+        part = rest.pop()
+        if isinstance(part, list):
+            rest += part
+        elif isinstance(part, dict):
+            rest += part.values()
+            names = (part.get(key) for key in _NAMING)
+            yield from (folder / name for name in names if isinstance(name, str))
 
 
 def _destination(where: str, file: Path) -> Path:
@@ -71,10 +94,17 @@ def _followed(where: str, file: Path) -> Path:
     return target
 
 
-def _require_no_input(where: str, target: Path, inputs: Sequence[Path]) -> None:
+def _require_no_input(where: str, target: Path, inputs: Iterable[Path]) -> None:
     if target == STANDARD_OUTPUT or not target.is_file():
         return
     for file in inputs:
         above = (target, *target.parents)
-        if file.exists() and any(place.samefile(file) for place in above):
+        if _exists(file) and any(place.samefile(file) for place in above):
             raise InputError(where, f"is read by this command: {file}", "another file")
+
+
+def _exists(file: Path) -> bool:
+    try:
+        return file.exists()
+    except OSError:  # too long a name
+        return False

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from guided_lgp import __version__
-from guided_lgp.cli.outputs import destinations
+from guided_lgp.cli.outputs import destinations, named_files
 from guided_lgp.cli.running import complain
 from guided_lgp.cli.terminal import (
     AsJson,
@@ -181,11 +181,13 @@ def plan(
     from guided_lgp.planning import plan as search
     from guided_lgp.scene import parse_scene
 
-    files = destinations({"--out": out, "--html": html}, [scene, params, models])
+    document = read_scene_or_plan(scene)
+    inputs = [scene, params, models, *named_files(document, scene.parent)]
+    inputs += [Path(skeleton)] if skeleton else []
+    files = destinations({"--out": out, "--html": html}, inputs)
     piped = STANDARD_OUTPUT in files.values()
     if piped and as_json:
         raise InputError("--json", "needs standard output, and so does a file named -")
-    document = read_scene_or_plan(scene)
     if is_plan(document):
         raise InputError(
             str(scene), "is a plan, not a scene", "a scene; view and export take plans"

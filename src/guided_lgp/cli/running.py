@@ -47,12 +47,21 @@ def run_program(program: Callable[[list[str]], int | None], arguments: Sequence[
     except MemoryError as error:
         _fail(error if debug else WorkerError("out of memory"), 3, debug)
     except OSError as error:
-        full = error.errno in (errno.ENOSPC, errno.EDQUOT)
-        fault = InputError(error.filename or "output", f"cannot be written: {error.strerror}")
-        _fail(fault if full else error, 2 if full else 3, debug)
+        fault = _mendable(error)
+        _fail(fault or error, 2 if fault else 3, debug)
     except Exception as error:
         _fail(error, 3, debug)
     sys.exit(code)
+
+
+def _mendable(error: OSError) -> InputError | None:
+    """What a user can do something about, wherever it comes up."""
+    where = str(error.filename or "output")
+    if error.errno in (errno.ENOSPC, errno.EDQUOT):
+        return InputError(where, f"cannot be written: {error.strerror}")
+    if error.errno in (errno.ENAMETOOLONG, errno.ELOOP):
+        return InputError(where, str(error.strerror), "a file")
+    return None
 
 
 def _open_streams() -> None:
