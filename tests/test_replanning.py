@@ -8,13 +8,22 @@ import numpy as np
 import pytest
 
 from guided_lgp import load_scene, plan
+from guided_lgp.bounds.execution.run import final_boxes
 from guided_lgp.cli.app import main
 from guided_lgp.errors import InputError
-from guided_lgp.logic import format_skeleton
+from guided_lgp.logic import format_skeleton, parse_skeleton
 from guided_lgp.observed import Observed, ObservedBox, observed_scene, read_observed
 from guided_lgp.paths import EXAMPLES
 from guided_lgp.poses import compose, pose
-from guided_lgp.replanning import Course, Laboratory, first_actions, follow, replan
+from guided_lgp.replanning import (
+    MIDDLE,
+    Course,
+    Laboratory,
+    first_actions,
+    follow,
+    in_the_middle,
+    replan,
+)
 from guided_lgp.scene import Scene
 from guided_lgp.scene.world import initial_poses
 
@@ -58,6 +67,28 @@ def test_a_place_that_has_come_undone_is_repaired(course: Course) -> None:
     found = replan(course, 2, _as_it_is(course.scene))
     assert found.how == "repaired"
     assert found.course.skeleton == course.skeleton
+
+
+def test_what_is_put_on_a_box_to_stay_there_is_put_in_its_middle(course: Course) -> None:
+    found = replan(course, 0, _as_it_is(course.scene)).course
+    boxes = final_boxes(found.scene, found.trajectory)
+    assert np.linalg.norm((boxes["red"] - boxes["green"])[:2]) < MIDDLE
+
+
+@pytest.mark.parametrize(
+    ("way", "goal"),
+    [
+        ("(grasp pr2L red) (place pr2L red green)", "at red green"),
+        ("(grasp pr2L red) (place pr2L red tab1)", ""),
+        ("(grasp pr2L red) (place pr2L red green) (grasp pr2L red)", ""),
+        ("(grasp pr2L red) (place pr2L red green) (grasp pr2R green)", ""),
+        ("(grasp pr2R green) (grasp pr2L red) (place pr2L red green)", ""),
+        ("(grasp pr2L red)", ""),
+    ],
+)
+def test_only_what_stays_is_put_in_the_middle(course: Course, way: str, goal: str) -> None:
+    found = in_the_middle(course.scene, parse_skeleton(way))
+    assert [" ".join((one.kind, *one.symbols[:2])) for one in found] == list(filter(None, [goal]))
 
 
 def test_a_box_that_others_stand_on_is_found_at_its_height(course: Course) -> None:

@@ -11,7 +11,8 @@ A laboratory's own perception and control go around it like this::
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import islice
+from functools import partial
+from itertools import accumulate, islice
 from typing import Literal
 
 import numpy as np
@@ -28,6 +29,7 @@ from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.bounds.verify.attachments import switches_of
 from guided_lgp.errors import InputError
 from guided_lgp.logic import (
+    Goal,
     Objective,
     Skeleton,
     State,
@@ -49,6 +51,10 @@ REPAIR = 2
 """Most actions that a repair puts before what is left of a plan."""
 TRIED = 4
 """Sequences whose geometry is tried before a plan is searched for anew."""
+MIDDLE = 0.01
+"""m from the middle of a box at which another one is put on it, where that can be."""
+ANY_TURN = 4.0
+"""rad: more than half a turn."""
 AWAY = 0.08
 """m that hands are from where they act when somebody looks."""
 _HOME = 2e-3
@@ -128,15 +134,49 @@ def replan(
     validate_scene(scene, where)
     goals, rest = course.objective, course.skeleton[after:]
     params = params or load_planning()
-    bounds = SceneBounds(scene, params.bounds, Deadline.after(timeout), goals, firm=True)
+    bounds = partial(SceneBounds, scene, params.bounds, Deadline.after(timeout), firm=True)
     for way in islice(_ways(scene.state, rest, goals, scene.symbols), TRIED):
-        path = bounds.path(way) if way else stay(scene)
-        if path.feasible:
-            return Replanned("kept" if way == rest else "repaired", path, scene, goals)
+        for more in dict.fromkeys((in_the_middle(scene, way), ())):
+            path = bounds((*goals, *more)).path(way) if way else stay(scene)
+            if path.feasible:
+                return Replanned("kept" if way == rest else "repaired", path, scene, goals)
     found = search(
         scene, list(map(str, goals)), params=params, timeout=timeout, where=where, coordinate=False
     )
     return Replanned("planned anew", found.path, found.scene, goals, found.explanation)
+
+
+def in_the_middle(scene: Scene, way: Skeleton) -> Objective:
+    """A goal by which the box that is put down next is in the middle of the one below it.
+
+    There it is farthest from a fall, whatever an arm is amiss. No goal where it is put on a table,
+    or where it or what is below it does not stay: goals hold at the end.
+    """
+    states = list(accumulate(way, successor, initial=scene.state))
+    for state in states[1:]:
+        for box, below in sorted(set(state.support) - set(scene.state.support)):
+            stacks = {_stack(later, box) for later in states[states.index(state) :]}
+            stays = len({_stack(state, below) for state in states}) == len(stacks) == 1
+            return _at_middle(scene, box, below) if stays else ()
+    return ()
+
+
+def _stack(state: State, body: str) -> tuple[str, ...]:
+    """A body and all that is below it, down to a table or a gripper."""
+    parents, stack = dict(state.support + state.held), [body]
+    while stack[-1] in parents:
+        stack.append(parents[stack[-1]])
+    return tuple(stack)
+
+
+def _at_middle(scene: Scene, box: str, below: str) -> Objective:
+    boxes, known = {body.name: body for body in scene.movable}, scene.symbols
+    on_a_box = below in boxes and _stack(scene.state, below)[-1] not in known.grippers
+    if not on_a_box or "at" not in {kind.name for kind in known.domain.further_goals}:
+        return ()
+    x, y, top = boxes[below].top
+    middle = (x, y, top + boxes[box].size[2] / 2, boxes[below].yaw, MIDDLE, ANY_TURN)
+    return (Goal("at", (box, below, *map(str, middle))),)
 
 
 def _require_boxes(course: Course, scene: Scene, where: str) -> None:
