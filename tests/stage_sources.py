@@ -83,6 +83,7 @@ _INFRASTRUCTURE = [
     "params",
     "paths",
     "sources",
+    "strict_yaml",
     "tables",
 ]
 INFRASTRUCTURE = {PACKAGE / f"{name}.py" for name in ("__init__", *_INFRASTRUCTURE)}
