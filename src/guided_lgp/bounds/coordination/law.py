@@ -46,9 +46,10 @@ def jerk_limited(path: Array, arm: Arm, slower: float = 1.0) -> Array:
     ticks = int(np.ceil((_SMOOTHER * shortest + SMOOTHING) / TICK - 1e-9))
     while True:
         rows = _averaged(law, (ticks * TICK - SMOOTHING) / law.duration, ticks)
-        if _excess(rows, arm) <= 1.0 / slower:
+        excess = slower * _excess(rows, arm)
+        if excess <= 1.0:
             return rows
-        ticks += 1
+        ticks = max(ticks + 1, int(excess * ticks) - 1)
 
 
 def ramp(fingers: Fingers, start: float, end: float) -> Array:

@@ -3,15 +3,14 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from guided_lgp.bounds.collision import PlanningScene, checker_of
 from guided_lgp.bounds.coordination.itinerary import Itinerary
-from guided_lgp.bounds.coordination.roads import Edge, Node, Road
+from guided_lgp.bounds.coordination.roads import BETWEEN, Edge, Node, Road
 from guided_lgp.bounds.results import Array
 from guided_lgp.scene import Scene
 
-_FINE = np.array([0.5, 1.0])
-"""Where between two rows configurations are checked."""
 _COARSE = 6
 """Every so-many-th moment is looked at first: what collides is found soon."""
 
@@ -47,12 +46,10 @@ class Moments:
         moments = [tuple(later(at, tick) for at in start) for tick in range(1, ticks + 1)]
         if not all(self._clear.get(moment, True) for moment in moments):
             return False
-        unknown = [moment for moment in moments if moment not in self._clear]
-        for step in (_COARSE, 1):
-            some = [moment for moment in unknown[::-step] if moment not in self._clear]
-            if some and not self._judge(some):
-                return False
-        return True
+        unknown = [tick for tick, moment in enumerate(moments) if moment not in self._clear]
+        first = unknown[::-_COARSE]
+        rest = [tick for tick in unknown if tick not in first]
+        return self._judge(moments, first) and self._judge(moments, rest)
 
     def block(self, moment: Moment) -> None:
         """Never come to a moment again."""
@@ -65,30 +62,31 @@ class Moments:
             for road, (where, _) in zip(self._roads, moment, strict=True)
         ]
 
-    def _judge(self, moments: Sequence[Moment]) -> bool:
-        """Whether moments between which no action takes effect are clear."""
+    def _judge(self, moments: Sequence[Moment], some: Sequence[int]) -> bool:
+        """Whether some of the moments are clear between which no action takes effect."""
+        if not some:
+            return True
         self._checker.enter(self._scene(moments[0]))
-        rows = np.concatenate([self._rows(moment) for moment in moments])
-        free = self._checker.free(rows).reshape(len(moments), -1)
-        self._clear |= {
-            moment: bool(clear.all()) for moment, clear in zip(moments, free, strict=True)
-        }
-        return bool(free.all())
+        free = self._checker.free(self._rows(moments[0], np.array(some))).reshape(len(some), -1)
+        clear = [bool(rows.all()) for rows in free]
+        self._clear |= zip((moments[tick] for tick in some), clear, strict=True)
+        return all(clear)
 
-    def _rows(self, moment: Moment) -> Array:
-        """All moving joints (m, joints) on the way from the tick before."""
-        rows = np.empty((len(_FINE), len(self._robot.moving_joints)))
+    def _rows(self, moment: Moment, ticks: NDArray[np.int_]) -> Array:
+        """All moving joints (m, joints), some ticks after a moment, on the way from the tick before
+        each.
+        """
+        rows = np.empty((len(ticks), BETWEEN, len(self._robot.moving_joints)))
         arms = self._robot.arms.values()
         for arm, road, (where, row) in zip(arms, self._roads, moment, strict=True):
             if isinstance(where, Node):
-                rows[:, arm.slice], fingers = road.rest(where)
-                rows[:, arm.fingers.slice] = fingers * arm.fingers.ratios
-                continue
-            steps = where.q[row - 1] + _FINE[:, None] * (where.q[row] - where.q[row - 1])
-            rows[:, arm.slice] = steps
-            values = where.fingers[row - 1] + _FINE * (where.fingers[row] - where.fingers[row - 1])
-            rows[:, arm.fingers.slice] = values[:, None] * arm.fingers.ratios
-        return rows
+                q, fingers = road.rest(where)
+                values = fingers * arm.fingers.ratios
+            else:
+                q, values = where.fine[row - 1 + ticks], where.fine_fingers[row - 1 + ticks]
+                values = values[..., None] * arm.fingers.ratios
+            rows[..., arm.slice], rows[..., arm.fingers.slice] = q, values
+        return rows.reshape(-1, rows.shape[-1])
 
     def _scene(self, moment: Moment) -> PlanningScene:
         """What is where, and what may touch."""

@@ -23,14 +23,26 @@ def schedule(roads: Mapping[str, Road], moments: Moments) -> list[Moment] | None
     """The moments of a short schedule, one per tick and the start before; None if there is none,
     or none is found in good time.
     """
-    searches = ((_Search(roads, moments, weight), states) for weight, states in (_HASTE, _CARE))
-    found = [path for search, states in searches if (path := search.path(states)) is not None]
-    return min(found, key=len, default=None)
+    found: list[Moment] | None = None
+    for weight, states in (_HASTE, _CARE):
+        below = math.inf if found is None else len(found) - 1
+        found = _Search(roads, moments, weight, below).path(states) or found
+    return found
 
 
 class _Search:
-    def __init__(self, roads: Mapping[str, Road], moments: Moments, weight: float) -> None:
-        self._weight = weight
+    def __init__(
+        self, roads: Mapping[str, Road], moments: Moments, weight: float, below: float
+    ) -> None:
+        """Prepare.
+
+        Args:
+            roads: of all arms, by gripper.
+            moments: look for collisions.
+            weight: of the estimate.
+            below: ticks that a schedule may not take.
+        """
+        self._weight, self._below = weight, below
         self._roads = list(roads.values())
         self._grippers = list(roads)
         self._moments = moments
@@ -40,7 +52,7 @@ class _Search:
     def path(self, expansions: int) -> list[Moment] | None:
         """The moments of a schedule, if one is found in so many expansions."""
         start: Moment = tuple((road.start, 0) for road in self._roads)
-        if math.isinf(self._estimate(start)[0]):
+        if self._estimate(start)[0] >= self._below:
             return None
         order, costs = count(), {start: 0}
         self._parents[start] = None
@@ -59,7 +71,7 @@ class _Search:
                 if reached is None or cost >= costs.get(reached, cost + 1):
                     continue
                 least, total = self._estimate(reached)
-                if math.isinf(least) or not self._moments.clear(leaving, ticks):
+                if cost + least >= self._below or not self._moments.clear(leaving, ticks):
                     continue
                 costs[reached], self._parents[reached] = cost, (moment, leaving, ticks)
                 heappush(queue, (cost + self._weight * least, total, next(order), reached))
