@@ -36,8 +36,9 @@ def write_bag(motion: Motion, folder: Path) -> None:
     ):
         for group, joints in motion.groups().items():
             trajectories = [
-                (clock[segment.start], _trajectory(motion, segment, joints))
+                (clock[segment.parts[group][0]], _trajectory(motion, segment, group, joints))
                 for segment in motion.segments
+                if group in segment.parts
             ]
             _write(bag, f"/{group}/joint_trajectory", trajectories)
         _write(bag, "/joint_states", [(t, _state(motion, row)) for row, t in enumerate(clock)])
@@ -50,8 +51,8 @@ def _write(bag: Writer, topic: str, messages: list[tuple[int, Any]]) -> None:
         bag.write(connection, nanoseconds, _STORE.serialize_cdr(message, kind))
 
 
-def _trajectory(motion: Motion, segment: Segment, joints: tuple[str, ...]) -> Any:
-    columns, clock = motion.columns(joints), motion.nanoseconds
+def _trajectory(motion: Motion, segment: Segment, group: str, joints: tuple[str, ...]) -> Any:
+    columns, clock, (start, _) = motion.columns(joints), motion.nanoseconds, segment.parts[group]
     points = [
         _message(
             "trajectory_msgs/msg/JointTrajectoryPoint",
@@ -59,13 +60,13 @@ def _trajectory(motion: Motion, segment: Segment, joints: tuple[str, ...]) -> An
             velocities=motion.velocities[row, columns],
             accelerations=motion.accelerations[row, columns],
             effort=motion.positions[row, :0],
-            time_from_start=_time("Duration", clock[row] - clock[segment.start]),
+            time_from_start=_time("Duration", clock[row] - clock[start]),
         )
-        for row in segment.rows
+        for row in segment.points(group)
     ]
     return _message(
         "trajectory_msgs/msg/JointTrajectory",
-        header=_header(clock[segment.start]),
+        header=_header(clock[start]),
         joint_names=list(joints),
         points=points,
     )

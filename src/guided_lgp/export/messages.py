@@ -16,11 +16,11 @@ _DECIMALS = 9
 def trajectory_document(motion: Motion) -> dict[str, Any]:
     """The JSON document: where the robot starts, and one segment per action.
 
-    A segment has a ``trajectory_msgs/JointTrajectory`` for each controller and the commands to the
-    grippers. Its header's stamp is when it is sent, from the plan's start; the times of its points
-    count from there.
+    A segment has a ``trajectory_msgs/JointTrajectory`` for each controller that comes to rest in
+    it, and the commands to the grippers. A header's stamp is when a trajectory is sent, from the
+    plan's start; the times of its points count from there, and those of a gripper's commands from
+    the stamp of its fingers.
     """
-    clock = motion.nanoseconds
     return {
         "robot": motion.robot.name,
         "start": dict(zip(motion.joint_names, _rounded(motion.positions[0]), strict=True)),
@@ -28,17 +28,14 @@ def trajectory_document(motion: Motion) -> dict[str, Any]:
             {
                 "action": segment.action,
                 "trajectories": {
-                    group: _joint_trajectory(motion, segment, motion.columns(joints))
-                    for group, joints in motion.groups().items()
+                    group: _joint_trajectory(motion, segment, group)
+                    for group in motion.groups()
+                    if group in segment.parts
                 },
                 "gripper_commands": [
-                    {
-                        "gripper": command.gripper,
-                        "time_from_start": _duration(clock[command.row] - clock[segment.start]),
-                        "position": round(command.opening, _DECIMALS),
-                    }
-                    for command in motion.commands
-                    if segment.start <= command.row < segment.end
+                    command
+                    for gripper, (start, end) in segment.fingers().items()
+                    for command in _commands(motion, gripper, start, end)
                 ],
             }
             for segment in motion.segments
@@ -46,10 +43,24 @@ def trajectory_document(motion: Motion) -> dict[str, Any]:
     }
 
 
-def _joint_trajectory(motion: Motion, segment: Segment, columns: list[int]) -> dict[str, Any]:
+def _commands(motion: Motion, gripper: str, start: int, end: int) -> list[dict[str, Any]]:
     clock = motion.nanoseconds
+    return [
+        {
+            "gripper": gripper,
+            "time_from_start": _duration(clock[command.row] - clock[start]),
+            "position": round(command.opening, _DECIMALS),
+        }
+        for command in motion.commands
+        if command.gripper == gripper and start <= command.row < end
+    ]
+
+
+def _joint_trajectory(motion: Motion, segment: Segment, group: str) -> dict[str, Any]:
+    columns = motion.columns(motion.groups()[group])
+    clock, (start, _) = motion.nanoseconds, segment.parts[group]
     return {
-        "header": {"stamp": _duration(clock[segment.start]), "frame_id": ""},
+        "header": {"stamp": _duration(clock[start]), "frame_id": ""},
         "joint_names": [motion.joint_names[column] for column in columns],
         "points": [
             {
@@ -57,9 +68,9 @@ def _joint_trajectory(motion: Motion, segment: Segment, columns: list[int]) -> d
                 "velocities": _rounded(motion.velocities[row, columns]),
                 "accelerations": _rounded(motion.accelerations[row, columns]),
                 "effort": [],
-                "time_from_start": _duration(clock[row] - clock[segment.start]),
+                "time_from_start": _duration(clock[row] - clock[start]),
             }
-            for row in segment.rows
+            for row in segment.points(group)
         ],
     }
 
