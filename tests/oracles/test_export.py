@@ -24,10 +24,9 @@ from guided_lgp.export.messages import trajectory_document
 from guided_lgp.export.motion import Motion, motion_of
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-TASKS = {
-    "one arm": ("(on red green)", "(held blue)"),
-    "both at once": ("(on red tab2)", "(held blue)", "(on green tab1)"),
-}
+ALONE = ("--goal", "(on red green)", "--goal", "(held blue)")
+BOTH = ("--goal", "(on red tab2)", "--goal", "(held blue)", "--goal", "(on green tab1)")
+TASKS = {"one arm": ALONE, "both at once": BOTH, "in turns": (*BOTH, "--no-coordinate")}
 FINER = 6
 """Rows in place of one, to check a controller's interpolation."""
 
@@ -36,8 +35,8 @@ FINER = 6
 def plan_file(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("plan") / "plan.json"
     command = [sys.executable, "-m", "guided_lgp.cli", "plan", str(EXAMPLES / "three_boxes.json")]
-    command += [word for goal in request.param for word in ("--goal", goal)]
-    subprocess.run([*command, "--out", str(out)], check=True, capture_output=True, timeout=120)
+    command += [*request.param, "--out", str(out)]
+    subprocess.run(command, check=True, capture_output=True, timeout=120)
     return out
 
 
@@ -145,7 +144,8 @@ def test_interpolation_keeps_the_path_and_the_limits(
             for a, b in zip(motion.positions[:-1], motion.positions[1:], strict=True)
         ]
     )
-    scene = read_plan(plan_file).scene
+    scene, steps = read_plan(plan_file).scene, np.diff(plan["path"]["times"])
+    within = 2e-3 if np.ptp(steps) < 1e-5 else 1e-3  # where all arms move, rows are farther apart
     for arm in robot.arms.values():
         columns = [motion.joint_names.index(name) for name in robot.joint_names]
         tool = scene.robot.tool_poses(straight[:, columns])[arm.gripper][:, :3]
@@ -155,7 +155,7 @@ def test_interpolation_keeps_the_path_and_the_limits(
             np.linalg.norm(tool[max(0, (r - 1) * 30) : (r + 2) * 30] - point, axis=1).min()
             for r, point in zip(rows, followed, strict=True)
         ]
-        assert max(near) < 1e-3
+        assert max(near) < within
 
 
 def test_half_the_speed_takes_twice_the_time(plan_file: Path, motion: Motion) -> None:

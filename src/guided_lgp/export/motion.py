@@ -273,11 +273,18 @@ def _commands(
     for gripper, arm in robot.arms.items():
         if not arm.fingers.joints:
             continue
-        values = trajectory.joints(arm.fingers.joints[:1]) / arm.fingers.ratios[0]
+        values = trajectory.joints(arm.fingers.joints[:1])[:, 0] / arm.fingers.ratios[0]
         for first, last in legs:
-            for start, end in _runs(values[first : last + 1]):
-                opening = arm.fingers.opening(float(values[first + end, 0]))
+            for start, end in _strokes(values[first : last + 1]):
+                opening = arm.fingers.opening(float(values[first + end]))
                 yield GripperCommand(gripper, first + start, opening)
+
+
+def _strokes(values: Array) -> Iterator[tuple[int, int]]:
+    """First and last row of every stretch in which fingers move one way."""
+    way = np.sign(np.diff(values))
+    turns = [0, *(np.flatnonzero(np.diff(way)) + 1).tolist(), len(way)]
+    yield from ((start, end) for start, end in pairwise(turns) if way[start])
 
 
 def _runs(values: Array) -> Iterator[tuple[int, int]]:
