@@ -60,6 +60,9 @@ SEQUENCES_PER_ACTION = 100
 """Sequences that a search may hand to the coarse bound, beyond the limit of the experiments, for
 each action that a task needs at least."""
 
+PATIENCE = 3
+"""How many times as many starts a second search has where no fact says why there is no plan."""
+
 _NO_POSTURE = ("no motion found to the posture at the end", "another posture")
 """What is found, and what would help, where arms cannot go where goals want them."""
 
@@ -86,6 +89,11 @@ class PlanningResult(SearchResult):
     """Without a plan: what stopped the sequences, first what is nearest to the objective."""
     finding: Finding | None = None
     """Without a plan: why, as far as facts tell, and what would help."""
+
+    @property
+    def unexplained(self) -> bool:
+        """Whether it says that there is no plan, and no fact does."""
+        return self.reason in ("exhausted", "attempts") and self.finding is None
 
     @property
     def explanation(self) -> str:
@@ -213,7 +221,11 @@ def plan(
     found = search.plan(problem)
     if not found.solved and not deadline.passed and attempts.take_up():
         found = joined(found, search.plan(problem))
-    return attempts.result(found)
+    result = attempts.result(found)
+    if result.unexplained and not deadline.passed:
+        found = joined(found, search.plan(attempts.patient(params.bounds)))
+        result = attempts.result(found)
+    return result
 
 
 def _at_rest(
@@ -236,6 +248,7 @@ class _Attempts:
 
     def __init__(self, problem: Problem, observe: Callable[[SceneBounds], ObservedBounds]) -> None:
         self.first = self._last = problem
+        self._starts = 0
         self._observe = observe
 
     def widened(self, params: BoundsParams) -> Problem | None:
@@ -258,6 +271,16 @@ class _Attempts:
         )
         return self._last
 
+    def patient(self, params: BoundsParams) -> Problem:
+        """The problem with more starts for each verdict: facts have as many, and say nothing."""
+        last = self._last
+        self._starts += _observed(last).starts
+        more = params.model_copy(update={"coarse_restarts": PATIENCE * params.coarse_restarts})
+        bounds = SceneBounds(last.scene, more, last.deadline, last.objective, firm=True)
+        observed = self._observe(bounds)
+        self._last = replace(last, bounds=observed, parts=bounds, widened=lambda: None)
+        return self._last
+
     def take_up(self) -> bool:
         """Whether sequences have been put off: another search may look at them."""
         put_off = [_observed(problem).take_up() for problem in (self.first, self._last)]
@@ -271,7 +294,7 @@ class _Attempts:
             **vars(found),
             scene=problem.scene,
             objective=problem.objective,
-            solver_starts=bounds.starts,
+            solver_starts=self._starts + bounds.starts,
             obstacles=() if found.solved else obstacles,
             finding=None if found.solved else _finding(problem, obstacles),
         )
