@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from execution_page import PARTS, page
 from guided_lgp import parallel, plan
 from guided_lgp.bounds.coordination import Coordinator
 from guided_lgp.bounds.execution import Conditions, execute
@@ -58,6 +59,7 @@ AWAY = pose((5.0, 0.0, -1.0))
 KINDS = ("moved", "dropped", "taken away")
 NO_PLAN: dict[str, Any] = {"succeeded": False, "fault": "no plan"}
 HANDS = {"both_arms": 2, "one_arm": 1}
+"""How many arms act."""
 LIMITS = ("joint limit", "velocity", "acceleration", "jerk", "effort")
 
 
@@ -350,33 +352,6 @@ MEASURES: Mapping[str, Callable[[int], dict[str, Any]]] = {
 """By part, what measures it, given the number of random plans."""
 
 
-_TITLES = {
-    "friction_loaded": "friction alone, hands that carry boxes on a box",
-    "friction_noise_5mm": "friction alone, boxes misplaced by 5 mm",
-    "closed_loop_8mm": "towers of five, boxes misplaced by 8 mm, in closed loop",
-    "disturbed": "closed loop, a box moved, dropped or taken away: survived or named",
-}
-
-
-def page(figures: Mapping[str, Any]) -> str:
-    """The page of the figures."""
-    rows = [("random plans as shipped", figures)]
-    rows += [(f"friction alone, μ = {mu}", f) for mu, f in figures.get("friction", {}).items()]
-    rows += [(title, figures[key]) for key, title in _TITLES.items() if key in figures]
-    rows += [(f"towers of {n}", cell) for n, cell in figures.get("towers", {}).items()]
-    lines = [f"| {title} | {cell['succeeded']} | {cell['plans']} |" for title, cell in rows if cell]
-    table = "\n".join(["| | succeeded | plans |", "| :--- | ---: | ---: |", *lines])
-    shares = (
-        f"Rows outside any limit, from positions to jerk: {figures['rows_outside_limits']}. No arm "
-        f"moves in {100 * figures['waiting_share']:.0f} % of the time. Smallest distance from what "
-        f"is not touched: {figures['smallest_clearance_mm']:.1f} mm.\n"
-    )
-    origin = (
-        "Generated from `reports/metrics/execution.json`, which `make verify-execution` writes."
-    )
-    return f"# Plans carried out\n\n{origin}\n\n{table}\n\n{shares}"
-
-
 def main() -> None:
     """Measure some parts, or all."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -389,7 +364,8 @@ def main() -> None:
         write_json(FILE, figures)
         for file in ROWS.glob(f"{name}*"):
             file.unlink()
-    PAGE.write_text(page(figures), encoding="utf-8")
+    if figures.keys() >= PARTS:
+        PAGE.write_text(page(figures), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -22,18 +22,22 @@ def test_plans_that_were_not_found_do_not_count() -> None:
     assert execution.counted(rows) == {"plans": 2, "succeeded": 1, "faults": ["drift red"]}
 
 
-def test_the_page_has_a_row_for_each_part() -> None:
-    cell = {"plans": 40, "succeeded": 39, "faults": ["drift red"]}
+def test_the_page_has_a_row_for_each_part_with_its_faults() -> None:
+    cell = {"plans": 40, "succeeded": 38, "faults": ["drift red", ""], "survived": 30}
     figures = {
         **cell,
         "rows_outside_limits": 0,
+        "duration_ratio": {hands: {"median": 0.5, "worst": 0.7} for hands in execution.HANDS},
         "waiting_share": 0.2,
         "smallest_clearance_mm": 2.5,
         "friction": {"0.6": cell},
         "towers": {"8": cell},
-        "disturbed": cell,
+        "closed_loop_8mm": cell | {"open_loop": cell},
+        **dict.fromkeys(("friction_loaded", "friction_noise_5mm", "disturbed"), cell),
     }
+    assert figures.keys() >= execution.PARTS
     page = execution.page(figures)
-    assert "| friction alone, μ = 0.6 | 39 | 40 |" in page
-    assert "| towers of 8 | 39 | 40 |" in page
-    assert "Smallest distance from what is not touched: 2.5 mm" in page
+    assert "| friction alone, μ = 0.6 | 38 | 40 | 1 `drift`, 1 `goal` |" in page
+    assert "| towers of 8 | 38 | 40 |" in page
+    assert "| the same plans in open loop | 38 | 40 |" in page
+    assert "not touched: 2.5 mm" in page
