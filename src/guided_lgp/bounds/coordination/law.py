@@ -24,6 +24,8 @@ _SHARE = 0.99
 """Share of the limits that is used, so that the rounded rows keep them too."""
 _SMOOTHER = 0.85
 """Share of the fastest law's time that is tried first: means do not reach its peaks."""
+_CREEPING = 1e-3
+"""Velocity (m/s of the arm's motion) below which it creeps: 4 cm then take 20 s and more."""
 _FINGER_SHARE = 0.97
 """Share of their velocity limit at which fingers move."""
 
@@ -42,6 +44,24 @@ def jerk_limited(path: Array, arm: Arm, slower: float = 1.0) -> Array:
     law = fastest_law(path, arm, _SHARE)
     if law.duration == 0.0:
         return law.path
+    if _creeps(law):
+        back = fastest_law(path[::-1], arm, _SHARE)
+        if back.duration < law.duration:
+            return _followed(back, arm, slower)[::-1]
+    return _followed(law, arm, slower)
+
+
+def _creeps(law: Law) -> bool:
+    """Whether an arm nearly stops on its way.
+
+    Of the laws on a grid the one that is always as fast as it can be may run into a bend at which
+    it can only stop. Backwards it comes from the other side, and most often does not.
+    """
+    return bool(law.speeds[1:-1].min(initial=np.inf) < _CREEPING)
+
+
+def _followed(law: Law, arm: Arm, slower: float) -> Array:
+    """The fewest rows of a law that keep the limits."""
     shortest = slower * law.duration
     ticks = int(np.ceil((_SMOOTHER * shortest + SMOOTHING) / TICK - 1e-9))
     while True:
