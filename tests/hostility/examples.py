@@ -9,11 +9,11 @@ from pathlib import Path
 from unittest.mock import patch
 
 import numpy as np
-import pyarrow as pa
 import yaml
 from outputs import write_outputs
 from own_robot import describe, document, written
 
+from enumerated import write_enumeration
 from guided_lgp import tracking
 from guided_lgp.bounds.plan_file import read_plan, write_plan
 from guided_lgp.cases.outcomes import outcomes_of, times_of
@@ -22,7 +22,6 @@ from guided_lgp.cases.shards import write_kept
 from guided_lgp.documents import read_json, write_json
 from guided_lgp.experiments import enumerate_sequences
 from guided_lgp.logic import (
-    format_objective,
     parse_objective,
     two_goal_objectives,
 )
@@ -35,10 +34,8 @@ from guided_lgp.planning import plan
 from guided_lgp.policy.paper.dataset import Dataset
 from guided_lgp.policy.paper.samples import build_dataset
 from guided_lgp.policy.tensors import read_tensors, write_tensors
-from guided_lgp.scene import Scene, generate, load_scene, load_scenes
-from guided_lgp.sequences import SHORTEST, VERDICTS
+from guided_lgp.scene import generate, load_scene, load_scenes
 from guided_lgp.studies.cases import RESULTS
-from guided_lgp.tables import write_table
 from stand_ins import NothingOnBlue
 
 ROOT = Path(__file__).parents[2]
@@ -162,15 +159,7 @@ class Examples:
         folder = self._new("sequences")
         generate("a", 2, 1, "scene").save(folder / "scenes.json")
         scenes = load_scenes(folder / "scenes.json").scenes
-        grasps = [(s, box.name) for s in scenes for box in s.boxes]
-        verdicts = [_verdict(scene, box) for scene, box in grasps]
-        shortest = [
-            {"configuration": scene.name, "objective": format_objective(pair), "length": 1}
-            for scene in scenes
-            for pair in two_goal_objectives(scene.symbols)
-        ]
-        write_table(folder / "verdicts.parquet", pa.Table.from_pylist(verdicts, schema=VERDICTS))
-        write_table(folder / "shortest.parquet", pa.Table.from_pylist(shortest, schema=SHORTEST))
+        write_enumeration(folder, scenes, two_goal_objectives(scenes[0].symbols))
         built(folder).save(folder / "dataset")
         return folder
 
@@ -247,17 +236,6 @@ def _stl(corners: list[list[float]]) -> bytes:
         np.array([[0, 0, 1], *triangle], "<f4").tobytes() + b"\0\0" for triangle in triangles
     )
     return bytes(80) + len(triangles).to_bytes(4, "little") + b"".join(records)
-
-
-def _verdict(scene: Scene, box: str) -> dict[str, object]:
-    return {
-        "configuration": scene.name,
-        "skeleton": f"(grasp pr2L {box})",
-        "length": 1,
-        "feasible": box != "blue",
-        "failure_constraint": "reach" if box == "blue" else None,
-        "states": [0.1 * step for step in range(42)] if box != "blue" else None,
-    }
 
 
 def built(folder: Path) -> Dataset:

@@ -27,6 +27,7 @@ from hypothesis import strategies as st
 from pydantic import TypeAdapter
 from safetensors.numpy import load_file, save_file
 
+from enumerated import write_enumeration
 from guided_lgp.bounds.plan_file import read_plan
 from guided_lgp.domains import load_domain
 from guided_lgp.logic import two_goal_objectives
@@ -40,7 +41,7 @@ from guided_lgp.report.metrics import read_metrics
 from guided_lgp.scene import GeneratedScenes, generate, load_scene, load_scenes
 from guided_lgp.scene.setups import SETUPS
 from guided_lgp.sequences import SHORTEST, VERDICTS
-from guided_lgp.tables import read_columns, write_table
+from guided_lgp.tables import read_columns
 
 SYMBOLS = load_domain().symbols(
     gripper=("pr2L", "pr2R"), box=("red", "green", "blue"), table=("tab1", "tab2")
@@ -113,28 +114,8 @@ def test_truncated_scene_files(data: st.DataObject, scenes: Path, folder: Path) 
 @pytest.fixture(scope="module")
 def tables(scenes: Path, folder: Path) -> Mapping[str, Path]:
     """Both tables of the enumeration, as if one action had been feasible in each scene."""
-    found = load_scenes(scenes)
-    verdicts, shortest = [], []
-    for scene in found.scenes:
-        for box in SYMBOLS.boxes:
-            verdicts.append(
-                {
-                    "configuration": scene.name,
-                    "skeleton": f"(grasp pr2L {box})",
-                    "length": 1,
-                    "feasible": box != "blue",
-                    "failure_constraint": "reach" if box == "blue" else None,
-                    "states": [0.1 * step for step in range(42)] if box != "blue" else None,
-                }
-            )
-        shortest += [
-            {"configuration": scene.name, "objective": " ".join(map(str, goals)), "length": 1}
-            for goals in OBJECTIVES
-        ]
-    paths = {"verdicts": folder / "verdicts.parquet", "shortest": folder / "shortest.parquet"}
-    write_table(paths["verdicts"], pa.Table.from_pylist(verdicts, schema=VERDICTS))
-    write_table(paths["shortest"], pa.Table.from_pylist(shortest, schema=SHORTEST))
-    return paths
+    files = write_enumeration(folder, load_scenes(scenes).scenes, OBJECTIVES)
+    return dict(zip(("verdicts", "shortest"), files, strict=True))
 
 
 COLUMNS = {"verdicts": VERDICTS, "shortest": SHORTEST}
