@@ -12,14 +12,14 @@ import statistics
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 from guided_lgp import cache
-from guided_lgp.documents import read_json, write_json
+from guided_lgp.documents import read_json, write_json, write_text
 from guided_lgp.experiments import (
     build_dataset,
     enumerate_sequences,
@@ -31,7 +31,7 @@ from hostility import environments, kills, limits, planted, races
 from hostility.commands import Commands
 from hostility.examples import ROOT, Examples
 from hostility.judge import Verdicts, judge
-from hostility.kills import contents, kill_a_stage
+from hostility.kills import kill_a_stage
 from hostility.loaders import loaders
 from hostility.writers import PARAMS, writers
 
@@ -45,7 +45,25 @@ STAGES = {
     train_relational: (1, 4, 7, 10),
 }
 """Stages of the small profile, and the moments at which they are killed."""
-
+PAGE, BEGIN, END = ROOT / "SECURITY.md", "<!-- make verify-hostile -->", "<!-- end of it -->"
+ROWS = {
+    "inputs": (
+        "{tried:,} spoilt files and commands: {refused:,} refused, {accepted:,} accepted",
+        "{foreign} errors in other words, {slow} took more than 5 s",
+    ),
+    "kills": (
+        "{inside_window} kills while files are written, {in_stages} of them of stages",
+        "{damaged} damaged or did not go on to the same bytes",
+    ),
+    "races": ("{runs} processes at once", "{torn} torn reads, {lost} lost results"),
+    "planted": ("{tried} planted files and folders", "{effective} were run or changed a file"),
+    "limits": (
+        "{tried} times a full disk or little memory",
+        "{torn} torn files, {foreign} ends in other words",
+    ),
+    "environments": ("{tried} environments", "{different} with other bytes"),
+}
+"""What the page says of each part."""
 
 Part = tuple[Any, list[str]]
 """The figures of a part, and what came through."""
@@ -107,10 +125,7 @@ def kill_stages(folder: Path, figures: kills.Figures) -> None:
         before = figures.in_stages
         kill_a_stage(lambda root, stage=stage: stage.run(params, root), roots[1], moments, figures)
         print(f"{stage.__name__}: {figures.in_stages - before} kills", flush=True)
-    expected, found = map(contents, roots)
-    for name in expected.keys() | found.keys():
-        if expected.get(name) != found.get(name) and ".shards" not in name:
-            figures.fault("damaged", f"{name} is another after kills")
+    kills.compare(*roots, figures)
 
 
 def raced(folder: Path) -> Part:
@@ -201,14 +216,31 @@ def main() -> int:
         with TemporaryDirectory(prefix="hostile-") as folder:
             figures, found = PARTS[name](Path(folder) / name)
         known = read_json(RESULT) if RESULT.is_file() else {}
-        write_json(
-            RESULT, {"seed": SEED, **{p: known[p] for p in PARTS if p in known}, name: figures}
-        )
+        parts = {part: known[part] for part in PARTS if part in known}
+        write_json(RESULT, {"seed": SEED, **parts, name: figures})
         faults += [f"{name}: {fault}" for fault in found]
         print(f"{name}: {len(found)} faults, {time.monotonic() - start:.0f} s", flush=True)
+    write_page(read_json(RESULT))
     for fault in faults:
         print(fault)
     return 1 if faults else 0
+
+
+def write_page(figures: Mapping[str, Any]) -> None:
+    """Put the figures between the two markers of the page."""
+    before, begin, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
+    _, end, after = rest.partition(END)
+    write_text(PAGE, f"{before}{begin}\n\n{table(figures)}\n{end}{after}")
+
+
+def table(figures: Mapping[str, Any]) -> str:
+    """What was tried and what came through, a row for each part that has run."""
+    rows = [
+        f"| {tried.format(**figures[part])} | {effect.format(**figures[part])} |"
+        for part, (tried, effect) in ROWS.items()
+        if part in figures
+    ]
+    return "\n".join(["| tried | came through |", "|---|---|", *rows, ""])
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 import ctypes
 import os
 import signal
+import sys
 import time
 from collections.abc import Callable
 from functools import partial
@@ -10,10 +11,11 @@ from pathlib import Path
 
 import pytest
 
+from guided_lgp import cli
 from guided_lgp.documents import read_json, write_text
 from guided_lgp.errors import InputError
-from hostile import RESULT, SEED, inputs, startup_ms
-from hostility import environments, judge, kills, limits, planted, races
+from hostile import BEGIN, END, PAGE, RESULT, SEED, inputs, startup_ms, table
+from hostility import commands, environments, judge, kills, limits, planted, races
 from hostility.kills import Writer
 from hostility.loaders import loaders
 
@@ -71,6 +73,22 @@ def test_the_judge_sees(
     assert len(found.faults) == 1
 
 
+@pytest.mark.parametrize(
+    "code",
+    [
+        "sys.exit(3)",
+        "sys.stderr.write('two\\nlines\\n'); sys.exit(2)",
+        "sys.stderr.write('x' * 400); sys.exit(2)",
+        "sys.stderr.write('\\x1b[31m'); sys.exit(2)",
+        "{}['x']",
+    ],
+)
+def test_commands_show_ends_in_other_words(code: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cli, "main", lambda words: exec(code))
+    found = judge.judge(lambda number: commands.run(["plan"]), range(1))
+    assert found.counts == {"foreign": 1}
+
+
 def in_place(folder: Path, version: int) -> None:
     """Writes the file itself, with an unfinished one beside it for show."""
     unfinished, file = folder / ".unfinished-a", folder / "a"
@@ -98,6 +116,16 @@ def test_kills_show_a_writer_that_is_none(
     assert figures.damaged > 0
 
 
+def test_kills_show_a_stage_that_does_not_go_on(tmp_path: Path) -> None:
+    figures = kills.Figures()
+    for part, content in {"undisturbed": "a", "killed": "b"}.items():
+        write_text(tmp_path / part / "data" / "same", "same")
+        write_text(tmp_path / part / "data" / "other", content)
+    write_text(tmp_path / "undisturbed" / "data" / "missing", "")
+    kills.compare(tmp_path / "undisturbed", tmp_path / "killed", figures)
+    assert figures.damaged == 2
+
+
 def test_kills_do_not_harm_a_writer(tmp_path: Path) -> None:
     figures = kills.Figures()
     writer = Writer("text", lambda at, n: write_text(at / "a.txt", f"{n}" * 1000))
@@ -116,6 +144,34 @@ def test_races_show_what_is_lost(tmp_path: Path) -> None:
     figures = races.Figures()
     races.write_at_once(tmp_path, figures, 1, write=lambda file, _: write_text(file, "0" * 5000))
     assert figures.lost == 1
+
+
+def test_races_show_processes_that_fail(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    failing = (sys.executable, "-c", "import sys; open(sys.argv[-1], 'w').write('{}'); sys.exit(3)")
+    monkeypatch.setattr(races, "PROGRAM", failing)
+    for name in ("_SEVEN", "_REPAIR", "_RECORD"):
+        monkeypatch.setattr(races, name, "raise SystemExit(3)")
+    work: dict[str, tuple[Callable[[Path, races.Figures], None], int]] = {
+        "plans": (races.plan_at_once, 4),
+        "compiled": (races.compile_at_once, 4),
+        "repairs": (races.repair_at_once, 4),
+        "stages": (partial(races.run_stage_at_once, processes=2), 2),
+        "mlflow": (partial(races.record_at_once, processes=2), 2),
+    }
+    for name, (race, lost) in work.items():
+        figures = races.Figures()
+        (tmp_path / name).mkdir()
+        race(tmp_path / name, figures)
+        assert figures.lost == lost, name
+
+
+def test_races_show_a_stage_that_mixes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    code = "import os, pathlib as p; p.Path('data').mkdir(exist_ok=True); "
+    code += "p.Path('data/a').write_text(os.getcwd())"
+    monkeypatch.setattr(races, "PROGRAM", (sys.executable, "-c", code))
+    figures = races.Figures()
+    races.run_stage_at_once(tmp_path, figures, 2)
+    assert (figures.torn, figures.lost) == (1, 0)
 
 
 def test_writers_at_once_tear_nothing(tmp_path: Path) -> None:
@@ -176,6 +232,14 @@ def test_a_full_disk_shows_a_writer_in_place(tmp_path: Path) -> None:
     assert found == [(True, True), (False, False)]
 
 
+def test_little_memory_shows_half_a_plan(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    code = "import sys; open(sys.argv[-1], 'w').write('{'); print(1, 2, sep='\\n', file=sys.stderr)"
+    monkeypatch.setattr(limits, "PROGRAM", f"{code}; sys.exit(3)")
+    figures = limits.Figures()
+    limits.plan_with_little_memory(tmp_path / "a", figures)
+    assert (figures.torn, figures.foreign) == (figures.tried, figures.tried)
+
+
 def test_an_environment_that_matters_shows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     code = "import os, pathlib as p; p.Path('data').mkdir(); p.Path('data/a').write_text({})"
     figures = environments.Figures()
@@ -195,6 +259,7 @@ def test_the_published_figures_hold(tmp_path: Path) -> None:
     """Nothing came through, as often as was aimed at; and a few rows come out again."""
     figures = read_json(RESULT)
     assert figures["seed"] == SEED
+    assert f"{BEGIN}\n\n{table(figures)}\n{END}" in PAGE.read_text(encoding="utf-8")
     tried = figures["inputs"]
     assert tried["tried"] >= 30_000
     assert tried["tried"] == sum(row["tried"] for row in tried["by_reader"].values())

@@ -119,3 +119,20 @@ def test_given_actions_and_a_scene_are_not_overwritten(
         assert ended.value.code == 2
         assert "is read by this command" in capsys.readouterr().err
     assert actions.read_text() == "(grasp pr2L red)"
+
+
+def test_examples_want_an_empty_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "file").touch()
+    (tmp_path / "link").symlink_to("nowhere")
+    (tmp_path / "full" / "a").mkdir(parents=True)
+    for name in ("file", "link", "full"):
+        with pytest.raises(SystemExit) as ended:
+            cli.main(["examples", str(tmp_path / name)])
+        assert ended.value.code == 2
+        assert "is not an empty folder" in capsys.readouterr().err
+    (tmp_path / "empty").mkdir()
+    for name in ("empty", "new"):
+        with pytest.raises(SystemExit) as ended:
+            cli.main(["examples", str(tmp_path / name)])
+        assert not ended.value.code
+        assert (tmp_path / name / "three_boxes.json").is_file()

@@ -210,3 +210,11 @@ def kill_a_stage(
             figures.inside_window += 1
             figures.in_stages += 1
     run(root)
+
+
+def compare(undisturbed: Path, killed_often: Path, figures: Figures) -> None:
+    """Count the files of stages that are not those of an undisturbed run."""
+    expected, found = contents(undisturbed), contents(killed_often)
+    for name in sorted(expected.keys() | found.keys()):
+        if expected.get(name) != found.get(name) and ".shards" not in name:
+            figures.fault("damaged", f"{name} is another after kills")

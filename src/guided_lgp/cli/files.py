@@ -1,6 +1,7 @@
 """``examples export pddl schema view``: scenes and plans as files and pictures."""
 
 import json
+import os
 from enum import Enum
 from pathlib import Path
 from typing import Annotated
@@ -26,11 +27,18 @@ def examples(
 
     Example: guided-lgp examples
     """
-    if folder.exists() and any(folder.iterdir()):
-        raise InputError(str(folder), "is not empty", "a new folder")
+    if not _is_free(folder):
+        raise InputError(str(folder), "is not an empty folder", "a new folder")
     copy_whole(EXAMPLES, folder)
     for scene in sorted(folder.glob("*.json")):
         typer.echo(scene)
+
+
+def _is_free(folder: Path) -> bool:
+    try:
+        return not os.path.lexists(folder) or not any(folder.iterdir())
+    except OSError:  # a file, or somebody else's folder
+        return False
 
 
 @app.command()
