@@ -53,6 +53,7 @@ def test_every_part_has_a_table_and_ratios_come_from_one_run() -> None:
         "enumeration": twice,
         "path_bound": {"2": twice | unchanged, "10": {"n": 0} | unchanged},
         "plan_process": {"3": twice},
+        "plan_process_uncoordinated": {"3": twice},
     }
     page = benchmark_page(
         {
@@ -76,6 +77,7 @@ def test_every_part_has_a_table_and_ratios_come_from_one_run() -> None:
     assert page.count("\n**") == 10
     lines = page.splitlines()
     assert "| path bound, K = 2 | 20.0 | 10.0 | 2.0× | 5 |" in lines
+    assert "| guided-lgp plan --no-coordinate, K = 3 | 20.0 | 10.0 | 2.0× | 5 |" in lines
     assert "| 12.3 | 7.0 | 0.1 |" in lines
     assert "| feasible coarse verdict | 2.00 ms | 0.50 ms | its compiled code | 25.0% |" in lines
     assert "| 600 | 3 | 0.5% |" in lines

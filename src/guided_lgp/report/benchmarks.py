@@ -60,6 +60,10 @@ def _machine(machine: Metrics) -> str:
     )
 
 
+_COMMANDS = {"plan_process": "", "plan_process_uncoordinated": " --no-coordinate"}
+"""Parts that time the command, with the option that only this version has."""
+
+
 def _against(metrics: Metrics) -> Table:
     coarse = metrics["coarse_bound"]
     measured = {
@@ -69,7 +73,11 @@ def _against(metrics: Metrics) -> Table:
         "one step of the solver, 40 actions": metrics["coarse_step"],
         "enumeration of a configuration": metrics["enumeration"],
         **{f"path bound, K = {k}": row for k, row in metrics["path_bound"].items()},
-        **{f"`guided-lgp plan`, K = {k}": row for k, row in metrics["plan_process"].items()},
+        **{
+            f"guided-lgp plan{option}, K = {k}": row
+            for part, option in _COMMANDS.items()
+            for k, row in metrics.get(part, {}).items()
+        },
     }
     bounds = (coarse, *metrics["path_bound"].values())
     more, less = (sum(b[f"changed_to_{to}"] for b in bounds) for to in ("feasible", "infeasible"))
