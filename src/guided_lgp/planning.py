@@ -17,6 +17,7 @@ from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.domains import load_domain
 from guided_lgp.errors import InputError
 from guided_lgp.explanation import ObservedBounds, Obstacle
+from guided_lgp.hands import faster_by_other_hands
 from guided_lgp.logic import (
     Goal,
     Objective,
@@ -153,7 +154,8 @@ def plan(
         skeleton: actions with which the plan begins, also as text; or a file with them: a plan, or
             one action a line. If the goals hold after them, or there are none, they are the plan.
         candidates: how many plans to compare at most: the result is the one of the fewest actions,
-            of several the one of the shortest duration.
+            of several the one of the shortest duration. Where all arms may move at once, three
+            of four are the same actions by other hands.
         coordinate: whether all arms move at once where they can, with limited jerk and no way home
             that is not needed; actions of two arms may then change places, unless they are given.
             Otherwise one arm moves at a time.
@@ -199,6 +201,7 @@ def plan(
     observe: Callable[[SceneBounds], ObservedBounds] = ObservedBounds
     if coordinate:
         observe = partial(_observe, deadline=deadline, objective=goals, in_order=bool(prefix))
+    by_hands = candidates * 3 // 4 if coordinate and not prefix else 0
     problem = Problem(
         scene,
         goals,
@@ -208,7 +211,7 @@ def plan(
         parts=scene_bounds,
         misplaced=misplaced,
         prefix=prefix,
-        candidates=candidates,
+        candidates=candidates - by_hands,
         deadline=deadline,
     )
     attempts = _Attempts(problem, observe)
@@ -225,6 +228,8 @@ def plan(
     if result.unexplained and not deadline.passed:
         found = joined(found, search.plan(attempts.patient(params.bounds)))
         result = attempts.result(found)
+    if result.solved and by_hands:
+        result = attempts.result(attempts.by_other_hands(found, by_hands))
     return result
 
 
@@ -285,6 +290,10 @@ class _Attempts:
         """Whether sequences have been put off: another search may look at them."""
         put_off = [_observed(problem).take_up() for problem in (self.first, self._last)]
         return any(put_off)
+
+    def by_other_hands(self, found: SearchResult, count: int) -> SearchResult:
+        """The plan found, or a faster one of the same actions by other hands, of so many."""
+        return faster_by_other_hands(self._last, found, count)
 
     def result(self, found: SearchResult) -> PlanningResult:
         """What the searches have found, with what stopped the sequences of the last one."""

@@ -101,8 +101,8 @@ def plan(
         typer.Option(
             min=1,
             metavar="N",
-            help="Look for up to N plans and take the one of the fewest actions, of several the "
-            "one of the shortest duration.",
+            help="Look for up to N plans, also of the same actions by other hands, and take the "
+            "one of the fewest actions, of several the one of the shortest duration.",
         ),
     ] = 1,
     coordinate: Annotated[
