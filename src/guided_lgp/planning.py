@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-from guided_lgp.bounds.coordination import CoordinatedBounds, Coordinator
+from guided_lgp.bounds.coordination import CoordinatedBounds
 from guided_lgp.bounds.deadline import Deadline, OutOfTimeError
 from guided_lgp.bounds.goals import GoalTerms
 from guided_lgp.bounds.path.assembly import stay
@@ -153,9 +153,8 @@ def plan(
             names none, the paper's, or one that extends it if facts show that a goal needs it.
         skeleton: actions with which the plan begins, also as text; or a file with them: a plan, or
             one action a line. If the goals hold after them, or there are none, they are the plan.
-        candidates: how many plans to compare at most: the result is the one of the fewest actions,
-            of several the one of the shortest duration. Where all arms may move at once, three
-            of four are the same actions by other hands.
+        candidates: of so many plans at most the shortest, of several the fastest, is the result; if
+            all arms may move at once, three of four are the same actions by other hands.
         coordinate: whether all arms move at once where they can, with limited jerk and no way home
             that is not needed; actions of two arms may then change places, unless they are given.
             Otherwise one arm moves at a time.
@@ -229,7 +228,7 @@ def plan(
         found = joined(found, search.plan(attempts.patient(params.bounds)))
         result = attempts.result(found)
     if result.solved and by_hands:
-        result = attempts.result(attempts.by_other_hands(found, by_hands))
+        result = attempts.result(faster_by_other_hands(attempts.last, found, by_hands))
     return result
 
 
@@ -252,52 +251,48 @@ class _Attempts:
     """A problem, and the same with further instructions where a search has asked for them."""
 
     def __init__(self, problem: Problem, observe: Callable[[SceneBounds], ObservedBounds]) -> None:
-        self.first = self._last = problem
+        self.first = self.last = problem
         self._starts = 0
         self._observe = observe
 
     def widened(self, params: BoundsParams) -> Problem | None:
         """The problem with further instructions, if a goal needs them and there is time to tell."""
         problem, scene = self.first, None
-        if self._last is not problem:
-            return self._last
+        if self.last is not problem:
+            return self.last
         with suppress(OutOfTimeError):
             scene = widened_scene(problem.scene, problem.objective, params, problem.deadline)
         if scene is None:
             return None
         bounds = SceneBounds(scene, params, problem.deadline, problem.objective, firm=True)
         knows = problem.policy and not missing_instructions(problem.policy, scene.symbols.domain)
-        self._last = replace(
+        self.last = replace(
             problem,
             scene=scene,
             bounds=self._observe(bounds),
             parts=bounds,
             policy=problem.policy if knows else Uniform(),
         )
-        return self._last
+        return self.last
 
     def patient(self, params: BoundsParams) -> Problem:
         """The problem with more starts for each verdict: facts have as many, and say nothing."""
-        last = self._last
+        last = self.last
         self._starts += _observed(last).starts
         more = params.model_copy(update={"coarse_restarts": PATIENCE * params.coarse_restarts})
         bounds = SceneBounds(last.scene, more, last.deadline, last.objective, firm=True)
         observed = self._observe(bounds)
-        self._last = replace(last, bounds=observed, parts=bounds, widened=lambda: None)
-        return self._last
+        self.last = replace(last, bounds=observed, parts=bounds, widened=lambda: None)
+        return self.last
 
     def take_up(self) -> bool:
         """Whether sequences have been put off: another search may look at them."""
-        put_off = [_observed(problem).take_up() for problem in (self.first, self._last)]
+        put_off = [_observed(problem).take_up() for problem in (self.first, self.last)]
         return any(put_off)
-
-    def by_other_hands(self, found: SearchResult, count: int) -> SearchResult:
-        """The plan found, or a faster one of the same actions by other hands, of so many."""
-        return faster_by_other_hands(self._last, found, count)
 
     def result(self, found: SearchResult) -> PlanningResult:
         """What the searches have found, with what stopped the sequences of the last one."""
-        problem, bounds = self._last, _observed(self._last)
+        problem, bounds = self.last, _observed(self.last)
         obstacles = bounds.obstacles(problem.scene.state, problem.objective)
         return PlanningResult(
             **vars(found),
@@ -313,9 +308,7 @@ def _observe(
     bounds: SceneBounds, deadline: Deadline, objective: Objective, in_order: bool
 ) -> ObservedBounds:
     """The bounds of a scene as the search uses them, with motions of all arms at once."""
-    goals = GoalTerms.of(objective, bounds.scene.symbols.domain)
-    coordinator = Coordinator(bounds.scene, deadline, goals, in_order)
-    return ObservedBounds(CoordinatedBounds(bounds, coordinator))
+    return ObservedBounds(CoordinatedBounds.of(bounds, deadline, objective, in_order))
 
 
 def _observed(problem: Problem) -> ObservedBounds:

@@ -1,10 +1,13 @@
 """The bounds of a scene, with paths in which all arms move."""
 
-from typing import Protocol
+from typing import Protocol, Self
 
 from guided_lgp.bounds.coordination.coordinate import Coordinator
+from guided_lgp.bounds.deadline import Deadline
+from guided_lgp.bounds.goals import GoalTerms
 from guided_lgp.bounds.results import CoarseResult, PathResult
-from guided_lgp.logic import Skeleton
+from guided_lgp.bounds.scene_bounds import SceneBounds
+from guided_lgp.logic import Objective, Skeleton
 
 
 class _Bounds(Protocol):
@@ -20,6 +23,14 @@ class CoordinatedBounds:
         self._bounds = bounds
         self._coordinator = coordinator
         self._paths: dict[Skeleton, PathResult] = {}
+
+    @classmethod
+    def of(
+        cls, bounds: SceneBounds, deadline: Deadline, objective: Objective, in_order: bool
+    ) -> Self:
+        """Those of a scene; see :class:`Coordinator`."""
+        goals = GoalTerms.of(objective, bounds.scene.symbols.domain)
+        return cls(bounds, Coordinator(bounds.scene, deadline, goals, in_order))
 
     def coarse(self, skeleton: Skeleton) -> CoarseResult:
         """One verified configuration per action, or why there is none."""
