@@ -1,21 +1,24 @@
 """How near a plan comes to what it does not touch."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from guided_lgp.bounds.results import Trajectory
+import numpy as np
+
+from guided_lgp.bounds.results import Array, Trajectory
 from guided_lgp.bounds.verify.attachments import switches_of
 from guided_lgp.bounds.verify.phase import Phase
 from guided_lgp.bounds.verify.touching import touches
-from guided_lgp.logic import Skeleton, successor
+from guided_lgp.logic import Skeleton, State, successor
 from guided_lgp.scene import Scene
 from guided_lgp.scene.world import World, initial_poses, world_of
 
 FARTHEST = 0.1
 """m: nobody asks for more."""
-_EVERY = 3
-"""Every so-many-th sample of 1 cm is looked at: no point moves more than 3 cm in between."""
+_RESTING = 0.03
+"""m of the hand's way up to which a box keeps no distance from what it stood on, or will stand on:
+as long as a straight way up."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +45,8 @@ def clearance_of(scene: Scene, skeleton: Skeleton, trajectory: Trajectory) -> Cl
     """The smallest clearance of a plan.
 
     Hand and box keep no distance while one takes or leaves the other, nor do a box and what it
-    stands on, before or after. Arms are not looked at against each other.
+    stands on as it is lifted and put down. Arms are not looked at against each other. Between two
+    samples no point moves more than 1 cm.
 
     Args:
         scene: the initial configuration.
@@ -59,40 +63,68 @@ def clearance_of(scene: Scene, skeleton: Skeleton, trajectory: Trajectory) -> Cl
         states.append(successor(states[-1], action))
     tools = scene.robot.tool_poses(q[:, : len(robot.joint_names)])
     allowed = touches(scene, skeleton, rows, tools)
+    rests = list(_rests(states, rows, tools, trajectory.times))
     ends, boxes = [0, *rows, len(q) - 1], initial_poses(scene)
     for index, (first, last) in enumerate(pairwise(ends)):
         part = slice(first, last + 1)
         phase = Phase(scene, states[index], boxes, q[part], trajectory.times[part])
-        around = states[max(index - 1, 0) : index + 2]
-        supports = {pair for state in around for pair in state.support}
         touched = phase.touches(allowed, trajectory.times)
-        nearest = _nearest_of(world, phase, touched, supports, nearest)
+        nearest = _nearest_of(world, phase, touched, rests, nearest)
         boxes = phase.boxes_at(-1)
     return nearest
+
+
+@dataclass(frozen=True)
+class _Rest:
+    """A box is lifted from a body, or put down on it, between two moments (s)."""
+
+    box: str
+    body: str
+    start: float
+    end: float
+
+
+def _rests(
+    states: Sequence[State], rows: Sequence[int], tools: Mapping[str, Array], times: Array
+) -> Iterator[_Rest]:
+    """While hands are where they have taken boxes or will let go of them, or near it."""
+    for (before, after), row in zip(pairwise(states), rows, strict=True):
+        for box, body in sorted(set(before.support) ^ set(after.support)):
+            lifted = before.support_of(box) == body
+            gripper = (after if lifted else before).holder(box)
+            if gripper is None:
+                continue
+            path = tools[gripper][row:, :3] if lifted else tools[gripper][row::-1, :3]
+            gone = np.linalg.norm(path - path[0], axis=1) > _RESTING
+            way = int(np.argmax(gone)) if gone.any() else len(path) - 1
+            first, last = (row, row + way) if lifted else (row - way, row)
+            yield _Rest(box, body, times[first], times[last])
 
 
 def _nearest_of(
     world: World,
     phase: Phase,
     touched: list[set[tuple[str, str]]],
-    supports: set[tuple[str, str]],
+    rests: Sequence[_Rest],
     nearest: Clearance,
 ) -> Clearance:
     """The smallest clearance of a phase, if it is smaller than that of those before it."""
     robot = world.scene.robot.description
-    for sample in range(0, len(phase.q), _EVERY):
+    for sample in range(len(phase.q)):
         boxes = phase.boxes_at(sample)
         fingers = robot.finger_values(phase.q[sample])
         world.set(phase.q[sample, : len(robot.joint_names)], boxes, fingers)
-        for part, body in _pairs(world, phase, touched[sample], supports):
+        time = float(phase.times[sample])
+        resting = {(r.box, r.body) for r in rests if r.start <= time <= r.end}
+        for part, body in _pairs(world, phase, touched[sample], resting):
             distance = world.distance(part, body, nearest.distance)
             if distance < nearest.distance:
-                nearest = Clearance(distance, part, body, float(phase.times[sample]))
+                nearest = Clearance(distance, part, body, time)
     return nearest
 
 
 def _pairs(
-    world: World, phase: Phase, touched: set[tuple[str, str]], supports: set[tuple[str, str]]
+    world: World, phase: Phase, touched: set[tuple[str, str]], resting: set[tuple[str, str]]
 ) -> Iterator[tuple[str, str]]:
     """Moving parts, and bodies that they do not touch."""
     scene, robot = world.scene, world.scene.robot.description
@@ -103,5 +135,5 @@ def _pairs(
         yield from ((link, body) for link in arm.links for body in bodies)
         yield from ((link, b) for link in arm.hand_links for b in bodies if b not in handled)
     for box in phase.grips:
-        near = {body for pair in supports if box in pair for body in pair} | {*phase.grips}
-        yield from ((box, body) for body in bodies if body not in near)
+        others = (body for body in bodies if body not in phase.grips)
+        yield from ((box, body) for body in others if (box, body) not in resting)

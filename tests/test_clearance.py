@@ -1,0 +1,47 @@
+"""How near plans come to what they do not touch."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent / "bounds"))
+from motions import CLOSED, PR2, Motion, from_above, reach, scene, shifted
+
+from guided_lgp.clearance import clearance_of
+from guided_lgp.logic import parse_skeleton
+
+SCENE = scene(red=(0.52, 0.30, 0.65, 0.2, "tab1"), green=(0.52, -0.30, 0.65, 0.1, "tab2"))
+BOTH = parse_skeleton("(grasp pr2L red) (grasp pr2R green)")
+HANDS = {"pr2L": "red", "pr2R": "green"}
+
+
+def both_grasped(lift: float) -> Motion:
+    """Both hands close before the first of them lifts."""
+    motion, boxes = Motion(SCENE), {box.name: box for box in SCENE.boxes}
+    above = {}
+    for gripper, box in HANDS.items():
+        tool = from_above(boxes[box], gripper)
+        at = reach(SCENE, gripper, tool)
+        above[gripper] = reach(SCENE, gripper, shifted(tool, z=lift), at)
+        high = reach(SCENE, gripper, shifted(tool, z=0.15), at)
+        motion.move(gripper, high).move(gripper, at).hand(gripper, CLOSED).attach(box, gripper)
+    for gripper in HANDS:
+        motion.move(gripper, above[gripper])
+    return motion
+
+
+def test_a_box_keeps_no_distance_from_its_table_as_it_is_lifted() -> None:
+    """Also after another hand has acted; what it comes nearest to then is something else."""
+    found = clearance_of(SCENE, BOTH, both_grasped(0.10).trajectory())
+    assert found.distance > 0.005
+    assert (found.part, found.body) != ("red", "tab1")
+
+
+def test_a_box_that_comes_back_to_its_table_is_near_it() -> None:
+    motion = both_grasped(0.10)
+    tool = from_above(SCENE.boxes[0], "pr2L")
+    low = reach(SCENE, "pr2L", shifted(tool, y=0.06, z=0.004), motion.q[PR2.arms["pr2L"].slice])
+    found = clearance_of(SCENE, BOTH, motion.move("pr2L", low).trajectory())
+    assert (found.part, found.body) == ("red", "tab1")
+    assert found.distance == pytest.approx(0.004, abs=0.002)
