@@ -399,6 +399,7 @@ def test_doctor_finds_a_damaged_cache_and_mends_it(
     assert str(file) in finding.detail
     assert finding.mend.endswith("doctor --repair")
     (tmp_path / "guided-lgp" / "without a digest").touch()
+    assert doctor._cache().detail.endswith(" and 1 more")
     whole = cache.kept("whole", b"content")
     assert len(doctor.repair()) == 2
     assert doctor._cache().ok

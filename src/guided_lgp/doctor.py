@@ -105,7 +105,8 @@ def _cache() -> Finding:
     except (InputError, OSError) as error:
         return Finding("Cache", False, str(error), _OWN_CACHE)
     if bad:
-        return Finding("Cache", False, f"damaged: {' '.join(map(str, bad))}", _REPAIR)
+        others = f" and {len(bad) - 1} more" if len(bad) > 1 else ""
+        return Finding("Cache", False, f"damaged: {bad[0]}{others}", _REPAIR)
     return Finding("Cache", True, f"{folder} for compiled solvers")
 
 
