@@ -360,7 +360,10 @@ def test_a_limit_of_time_ends_the_search_with_a_reason(
     assert "--timeout raises the limit" in said
 
 
-def test_doctor_says_how_to_mend(capsys: pytest.CaptureFixture[str]) -> None:
+def test_doctor_says_how_to_mend(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))  # whatever older versions have left
     with pytest.raises(SystemExit):
         cli.main(["doctor", "--json"])
     findings = {finding["name"]: finding for finding in json.loads(capsys.readouterr().out)}
