@@ -24,7 +24,7 @@ from guided_lgp.documents import read_json, write_json, written_whole
 from guided_lgp.errors import InputError
 from guided_lgp.paths import METRICS, SOURCES
 from guided_lgp.planning import PlanningResult, plan
-from shelf_scenes import Task, objective_of, robot_file, samples, scene_of
+from shelf_scenes import Task, objective_of, samples, scene_of
 
 PYTHON = SOURCES / ".cache" / "shelf" / "bin" / "python"
 PACKAGE = Path(__file__).with_name("shelf_package.py")
@@ -41,8 +41,8 @@ def tasks(folder: Path, *names: str) -> list[Task]:
     return sorted(found, key=lambda task: (task["demonstration"], task["base"]))
 
 
-def answer(task: Task, robot: str, motion: Path) -> dict[str, Any]:
-    """The row of a task, with a robot file; its motion goes to another file."""
+def answer(task: Task, motion: Path) -> dict[str, Any]:
+    """The row of a task; its motion goes to a file."""
     row = {
         "demonstration": task["demonstration"],
         "base": task["base"],
@@ -53,7 +53,7 @@ def answer(task: Task, robot: str, motion: Path) -> dict[str, Any]:
         return row | {"verdict": "start or end in collision", "actions": 0, "seconds": None}
     began = time.perf_counter()
     try:
-        scene = scene_of(task, robot)
+        scene = scene_of(task)
         goals = objective_of(task, scene)
         result = plan(scene, goals, timeout=TIMEOUT, coordinate=False)  # there is one arm
     except InputError as error:
@@ -118,9 +118,8 @@ def main(*names: str) -> None:
     """Compute the rows of all tasks, or of those that are named; the others stay as they are."""
     with TemporaryDirectory() as name:
         folder = Path(name)
-        robot = robot_file(folder)
         rows = {
-            task["name"]: answer(task, robot, folder / f"{task['name']}.npz")
+            task["name"]: answer(task, folder / f"{task['name']}.npz")
             for task in tasks(folder, *names)
         }
         found = {_key(row): row for row in (*(_before() if names else ()), *judged(rows, folder))}

@@ -17,15 +17,11 @@ is turned about the vertical such that fingers close along an axis.
 
 import json
 import math
-import re
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
-import guided_lgp.robots
 from guided_lgp.bounds.results import Trajectory
 from guided_lgp.poses import Array, apply, compose, inverse, pose, rotation_matrix, yaw_of
 from guided_lgp.scene import Box, Scene, parse_scene
@@ -49,36 +45,13 @@ _TOOL = np.array([0.0, 0.0, 0.1034, 0.0, -math.sqrt(0.5), 0.0, math.sqrt(0.5)])
 """Of the tool's frame in the hand's: between the fingertips, x out of the palm."""
 
 
-def robot_file(folder: Path) -> str:
-    """The Panda of the package: wrist and hand keep clear of the forearm.
-
-    The description of the Panda here leaves out these pairs of links, as it says by default.
-    """
-    file = Path(guided_lgp.robots.__file__).with_name("panda.yaml")
-    document = yaml.safe_load(file.read_text(encoding="utf-8"))
-    paths = document["description"]
-    pairs = (file.parent / paths["srdf"]).read_text(encoding="utf-8")
-    strict = folder / "panda.srdf"
-    strict.write_text(_LEFT_OUT.sub("", pairs), encoding="utf-8")
-    paths |= {"urdf": str((file.parent / paths["urdf"]).resolve()), "srdf": str(strict)}
-    paths["packages"] = {
-        name: str((file.parent / path).resolve()) for name, path in paths["packages"].items()
-    }
-    found = folder / "panda.yaml"
-    found.write_text(yaml.safe_dump(document), encoding="utf-8")
-    return str(found)
-
-
-_LEFT_OUT = re.compile(r'<disable_collisions [^>]*"panda_link5"[^>]* reason="Default"/>')
-
-
-def scene_of(task: Task, robot: str = ROBOT) -> Scene:
-    """The scene of a task, with the Panda that ships here or that of a robot file."""
+def scene_of(task: Task) -> Scene:
+    """The scene of a task."""
     x, y, z, *_ = base = np.array(task["robot"]["base"])
     joints = {
         f"panda_joint{n + 1}": value for n, value in enumerate(task["robot"]["joints"][:_ARM])
     }
-    placed = {"model": robot, "base": [x, y, yaw_of(base)], "height": z, "joints": joints}
+    placed = {"model": ROBOT, "base": [x, y, yaw_of(base)], "height": z, "joints": joints}
     surfaces = [_table(surface) for surface in task["surfaces"]]
     document = {
         "name": task["name"],

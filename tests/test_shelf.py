@@ -12,7 +12,6 @@ from guided_lgp import plan
 from guided_lgp.documents import read_json
 from guided_lgp.paths import METRICS
 from guided_lgp.poses import Array, compose, inverse, pose
-from guided_lgp.robots import load_robot
 from guided_lgp.scene.validate import validate_scene
 
 ROOT = Path(__file__).parents[1]
@@ -130,19 +129,10 @@ def test_of_three_bodies_none_moves_by_more_than_the_package_sees(
     assert np.ptp(poses[:, 1:], axis=0).max(initial=0.0) < 1e-9
 
 
-def test_the_wrist_keeps_clear_of_the_forearm(tmp_path: Path) -> None:
-    strict = load_robot(shelf_scenes.robot_file(tmp_path))
-    more = load_robot("panda").disabled_pairs - strict.disabled_pairs
-    assert {tuple(sorted(pair)) for pair in more} == {
-        ("panda_hand", "panda_link5"),
-        ("panda_link5", "panda_link7"),
-    }
-
-
 @pytest.mark.skipif(not shelf.PYTHON.exists(), reason="make shelf installs the package")
 def test_a_row_comes_out_again(tmp_path: Path) -> None:
     name = "shelf_0_5"
     (known,) = (r for r in read_json(FILE)["rows"] if (r["demonstration"], r["base"]) == (0, 5))
-    (one,), robot = shelf.tasks(tmp_path, name), shelf_scenes.robot_file(tmp_path)
-    (row,) = shelf.judged({name: shelf.answer(one, robot, tmp_path / f"{name}.npz")}, tmp_path)
+    (one,) = shelf.tasks(tmp_path, name)
+    (row,) = shelf.judged({name: shelf.answer(one, tmp_path / f"{name}.npz")}, tmp_path)
     assert {**row, "seconds": 0} == {**known, "seconds": 0}

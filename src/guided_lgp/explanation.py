@@ -1,11 +1,15 @@
-"""Why there is no plan: which constraint of which action stopped the sequences of a search."""
+"""Bounds for users: which constraint of which action stopped the sequences of a search."""
 
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from guided_lgp.bounds.deadline import Deadline
 from guided_lgp.bounds.results import CoarseResult, Failure, PathResult
+from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.logic import Action, Objective, Skeleton, State, format_skeleton, progress
+from guided_lgp.params import BoundsParams
+from guided_lgp.scene import Scene
 from guided_lgp.search.bounds import Bounds
 
 
@@ -48,6 +52,14 @@ class Obstacle:
             "example": [str(action) for action in self.example],
             "tried": self.tried,
         }
+
+
+def users_bounds(
+    scene: Scene, params: BoundsParams, deadline: Deadline, objective: Objective
+) -> SceneBounds:
+    """Bounds for a user's plan: grips hold firmly, where the scene does not give the grasps."""
+    firm = not any(box.grasps for box in scene.movable)
+    return SceneBounds(scene, params, deadline, objective, firm=firm)
 
 
 class ObservedBounds:

@@ -16,7 +16,7 @@ from guided_lgp.bounds.results import PathResult
 from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.domains import load_domain
 from guided_lgp.errors import InputError
-from guided_lgp.explanation import ObservedBounds, Obstacle
+from guided_lgp.explanation import ObservedBounds, Obstacle, users_bounds
 from guided_lgp.hands import faster_by_other_hands
 from guided_lgp.logic import (
     Goal,
@@ -161,8 +161,7 @@ def plan(
         where: the scene's file, for messages.
 
     Returns:
-        The result of the search: ``solved``, ``skeleton``, ``path``; or the ``explanation`` and
-        the ``obstacles``.
+        The result: ``solved``, ``skeleton``, ``path``; or the ``explanation`` and ``obstacles``.
 
     Raises:
         InputError: a fault in the scene, the objective, the names or the models.
@@ -193,7 +192,7 @@ def plan(
     if (prefix or misplaced) and not SEARCHES[planner].over_sequences:
         accepted = ", ".join(name for name, search in SEARCHES.items() if search.over_sequences)
         raise InputError("planner", f"{planner} knows neither sequences nor places", accepted)
-    scene_bounds = SceneBounds(scene, params.bounds, deadline, goals, firm=True)
+    scene_bounds = users_bounds(scene, params.bounds, deadline, goals)
     if finding := TaskFacts(scene_bounds, goals, misplaced).before_search():
         return _without_search(scene, goals, None, finding)
     search, followed = _guidance(planner, policy, models, scene)
@@ -264,7 +263,7 @@ class _Attempts:
             scene = widened_scene(problem.scene, problem.objective, params, problem.deadline)
         if scene is None:
             return None
-        bounds = SceneBounds(scene, params, problem.deadline, problem.objective, firm=True)
+        bounds = users_bounds(scene, params, problem.deadline, problem.objective)
         knows = problem.policy and not missing_instructions(problem.policy, scene.symbols.domain)
         self.last = replace(
             problem,
@@ -280,7 +279,7 @@ class _Attempts:
         last = self.last
         self._starts += _observed(last).starts
         more = params.model_copy(update={"coarse_restarts": PATIENCE * params.coarse_restarts})
-        bounds = SceneBounds(last.scene, more, last.deadline, last.objective, firm=True)
+        bounds = users_bounds(last.scene, more, last.deadline, last.objective)
         observed = self._observe(bounds)
         self.last = replace(last, bounds=observed, parts=bounds, widened=lambda: None)
         return self.last
