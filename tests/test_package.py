@@ -246,3 +246,8 @@ def test_continuous_integration_runs_what_anyone_can_run() -> None:
         assert f"```sh\n{command}\n```" in page.read_text(encoding="utf-8")
     for form in (ROOT / ".github/ISSUE_TEMPLATE").glob("*.yml"):
         assert {"name", "description", "body"} <= yaml.safe_load(form.read_text()).keys()
+
+
+def test_no_module_has_more_than_400_lines() -> None:
+    sources = (ROOT / "src").rglob("*.py")
+    assert {file for file in sources if len(file.read_text().splitlines()) > 400} == set()

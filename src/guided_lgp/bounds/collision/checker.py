@@ -9,20 +9,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
 from itertools import product
-from pathlib import Path
 from typing import Any
 
-import coal
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
 from guided_lgp.bounds.collision.certificate import Certificate
+from guided_lgp.bounds.collision.shapes import convex_shape, robot_shapes
 from guided_lgp.bounds.results import Array
 from guided_lgp.poses import IDENTITY
 from guided_lgp.robots import Arm
 from guided_lgp.scene import Box, Scene
-from guided_lgp.scene.shapes import Convex
 
 PADDING = 0.003
 """Distance (m) that everything keeps from everything, declared contacts apart."""
@@ -68,16 +66,16 @@ class CollisionChecker:
         base = pin.XYZQUATToSE3(scene.robot.base_pose)
         self._geometry = pin.GeometryModel()
         self._names: list[str] = []
-        for body, shape in _robot_bodies(robot.urdf):
+        for body, shape in robot_shapes(robot.urdf):
             placement = base * body.placement if body.parentJoint == 0 else body.placement
             self._add(body.name[: body.name.rindex("_")], body.parentJoint, placement, shape)
         for joint in range(1, self._model.njoints):
             if self._model.parents[joint] == 0:
                 self._model.jointPlacements[joint] = base * self._model.jointPlacements[joint]
         for body in (*scene.in_the_way, *scene.supports):
-            self._add(body.name, 0, pin.XYZQUATToSE3(body.placement), _shape(body.convex))
+            self._add(body.name, 0, pin.XYZQUATToSE3(body.placement), convex_shape(body.convex))
         for box in scene.movable:
-            self._add(box.name, 0, pin.XYZQUATToSE3(IDENTITY), _shape(box.convex))
+            self._add(box.name, 0, pin.XYZQUATToSE3(IDENTITY), convex_shape(box.convex))
         self._bodies: dict[str, list[int]] = {}
         for number, name in enumerate(self._names):
             self._bodies.setdefault(name, []).append(number)
@@ -376,32 +374,6 @@ def checker_of(scene: Scene) -> CollisionChecker:
     Whoever uses it enters a planning scene first, unless the one it wants is ``entered``.
     """
     return CollisionChecker(scene)
-
-
-@cache
-def _robot_bodies(urdf: Path) -> tuple[tuple[Any, Any], ...]:
-    """Geometry object and convex shape of every collision geometry of a robot's links."""
-    model = pin.buildModelFromUrdf(str(urdf))
-    geometry = pin.buildGeomFromUrdf(model, str(urdf), pin.GeometryType.COLLISION)
-    bodies = []
-    for body in geometry.geometryObjects:
-        shape = body.geometry
-        if isinstance(shape, coal.BVHModelBase):
-            shape.buildConvexHull(True, "Qt")
-            shape = shape.convex
-        bodies.append((body, shape))
-    return tuple(bodies)
-
-
-def _shape(convex: Convex) -> Any:
-    """A body in coal."""
-    if convex.shape == "mesh":
-        vertices = coal.StdVec_Vec3s()
-        vertices.extend(np.array(vertex) for vertex in convex.vertices)
-        return coal.ConvexBase.convexHull(vertices, True, "Qt")
-    if convex.shape == "cylinder":
-        return coal.Cylinder(convex.half[0], 2 * convex.half[2])
-    return coal.Box(*(2 * half for half in convex.half))
 
 
 @cache
