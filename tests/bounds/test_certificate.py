@@ -110,9 +110,11 @@ def test_any_robot(model: str) -> None:
     checker.enter(PlanningScene(gripper, initial_poses(placed), also=frozenset(others)))
     low, high = robot.position_limits.T
     q = np.random.default_rng(4).uniform(low, high, (600, len(low)))
-    sure = checker.certified(checker.moving_joints(q, {}))
+    moving = checker.moving_joints(q, {})
+    sure = checker.certified(moving)
     assert sure.any()
     assert all(checker.first_collision(row[None], {}) is None for row in q[sure])
+    assert checker.free(moving)[sure].all()
 
 
 def test_without_a_compiler_coal_decides_everything(monkeypatch: pytest.MonkeyPatch) -> None:

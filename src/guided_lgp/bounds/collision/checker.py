@@ -246,7 +246,7 @@ class CollisionChecker:
         unsure = np.flatnonzero(~free)
         coordinates = self.coordinates(moving[unsure, : len(self._robot.joint_names)], {})
         for gripper, hand in self._fingers.items():
-            values = moving[unsure, hand.slice.start, None] / hand.ratios[0]
+            values = moving[unsure, hand.slice][:, :1] / hand.ratios[:1]  # none of fixed jaws
             coordinates[:, self._finger_at[gripper]] = values * hand.ratios
         free[unsure] = [self._collision(row) is None for row in coordinates]
         return free
