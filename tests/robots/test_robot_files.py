@@ -131,7 +131,7 @@ _WRIST = ("forearm_roll", "wrist_flex", "wrist_roll")
     ("fields", "message"),
     [
         ({"redundant": None}, r"an arm of 7 joints, redundant: none \(six joints, or seven"),
-        ({"hand_links": ["l_gripper_palm_link"], "spheres": None}, r"pr2L.hand_links: l_gripper"),
+        ({"hand_links": ["l_gripper_palm_link"], "spheres": None}, r"hand_links: lack l_gripper"),
         (
             {"joints": [f"<side>_{joint}_joint" for joint in (*_JOINTS, *_WRIST)]},
             "do not carry l_gripper_tool_frame one after the other",

@@ -1,6 +1,6 @@
 """The bounds of a scene, with paths in which all arms move."""
 
-from typing import Protocol, Self
+from typing import Protocol
 
 from guided_lgp.bounds.coordination.coordinate import Coordinator
 from guided_lgp.bounds.deadline import Deadline
@@ -27,7 +27,7 @@ class CoordinatedBounds:
     @classmethod
     def of(
         cls, bounds: SceneBounds, deadline: Deadline, objective: Objective, in_order: bool
-    ) -> Self:
+    ) -> "CoordinatedBounds":
         """Those of a scene; see :class:`Coordinator`."""
         goals = GoalTerms.of(objective, bounds.scene.symbols.domain)
         return cls(bounds, Coordinator(bounds.scene, deadline, goals, in_order))

@@ -251,6 +251,7 @@ class Execution:
     def _let_go(self, gripper: str, box: str, after: State) -> str:
         """The fingers begin to open; a fault if the box is above what it should stand on."""
         self._release(gripper, box)
+        self._seen[box] = self._simulation.box(box)  # for a hand that comes before this one leaves
         support = after.support_of(box)
         high = support is not None and self._world.distance(box, support, 2 * DROP) > DROP
         return f"stand {box} {support}" if high else ""
