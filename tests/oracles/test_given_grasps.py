@@ -10,8 +10,12 @@ import pytest
 from plan_checker import check
 
 from guided_lgp import plan
+from guided_lgp.bounds.path.task import Task
 from guided_lgp.bounds.plan_file import write_plan
+from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.errors import InputError
+from guided_lgp.logic import parse_skeleton
+from guided_lgp.params import load_planning
 from guided_lgp.poses import apply, compose, inverse
 from guided_lgp.scene import Scene, parse_scene
 
@@ -65,6 +69,14 @@ def test_the_hand_holds_exactly_so(grasp: list[float], tmp_path: Path) -> None:
     assert check(document) == []
     document["scene"]["boxes"][0]["grasps"] = [[grasp[0] + 0.01, *grasp[1:]]]
     assert [fault.kind for fault in check(document)] == ["grasp"]
+
+
+def test_where_none_of_them_is_free_there_is_no_motion(monkeypatch: pytest.MonkeyPatch) -> None:
+    bounds = SceneBounds(scene(grasps=[LOW]), load_planning().bounds)
+    skeleton = parse_skeleton("(grasp panda red) (place panda red right)")
+    assert bounds.coarse(skeleton).feasible
+    monkeypatch.setattr(Task, "blocked", lambda *_: True)
+    assert not bounds.path(skeleton).feasible
 
 
 def test_what_has_no_upright_sides_is_held_where_the_scene_says() -> None:

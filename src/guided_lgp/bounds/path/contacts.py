@@ -62,7 +62,8 @@ class ContactSampler:
         if not given and width == self._task.widths(index)[0]:
             central += self._coarse_grip(index)
         box = situation.boxes(self._task.arms)[body]
-        for strategy, grips in product(STRATEGIES, (central, others)):
+        batches = [batch for batch in (central, others) if len(batch)]  # given grasps are one
+        for strategy, grips in product(STRATEGIES, batches):
             outlook = self._foresight.outlook(index, situation, grips, width, strategy)
             if outlook is None:
                 continue
