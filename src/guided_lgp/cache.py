@@ -196,13 +196,19 @@ def _locked(file: Path) -> Iterator[None]:
 def _nobody_makes(file: Path) -> bool:
     descriptor = _open_lock(file)
     try:
+        return lock_at_once(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def lock_at_once(descriptor: int) -> bool:
+    """Lock a file unless another process has; where there are no locks, nobody else has."""
+    try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         return False
     except OSError:  # a file system without locks
         return True
-    finally:
-        os.close(descriptor)
     return True
 
 

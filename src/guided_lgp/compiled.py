@@ -86,8 +86,11 @@ def load_generated(name: str, key: str, generate: Callable[[], str]) -> ctypes.C
 
 
 def address(array: NDArray[Any] | None) -> ctypes.c_void_p:
-    """Where a contiguous array begins; null for none."""
-    return ctypes.c_void_p(None if array is None else array.ctypes.data)
+    """Where a contiguous array begins; null for none.
+
+    By numpy's interface, which is several times faster than by ``array.ctypes``.
+    """
+    return ctypes.c_void_p(None if array is None else array.__array_interface__["data"][0])
 
 
 def _compilers() -> Iterator[list[str]]:

@@ -10,7 +10,7 @@ from guided_lgp.logic import (
     Skeleton,
     State,
     Symbols,
-    applicable_actions,
+    are_applicable,
     progress,
     satisfied,
     successor,
@@ -72,7 +72,7 @@ def with_other_hands(skeleton: Skeleton, state: State, symbols: Symbols) -> Iter
     choices.sort(key=lambda hands: (max(Counter(hands).values(), default=0), -_turns(hands)))
     for hands in choices:
         changed = _renamed(skeleton, holds, hands)
-        if changed != skeleton and _applicable(changed, state, symbols):
+        if changed != skeleton and are_applicable(changed, state, symbols):
             yield changed
 
 
@@ -106,12 +106,3 @@ def _renamed(skeleton: Skeleton, holds: Sequence[_Hold], hands: Sequence[str]) -
         Action(a.instruction, tuple(names.get((number, symbol), symbol) for symbol in a.symbols))
         for number, a in enumerate(skeleton)
     )
-
-
-def _applicable(skeleton: Skeleton, state: State, symbols: Symbols) -> bool:
-    """Whether every action can be carried out in its turn."""
-    for action in skeleton:
-        if action not in applicable_actions(state, symbols):
-            return False
-        state = successor(state, action)
-    return True

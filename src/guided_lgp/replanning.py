@@ -35,6 +35,7 @@ from guided_lgp.logic import (
     State,
     Symbols,
     applicable_actions,
+    are_applicable,
     format_skeleton,
     progress,
     satisfied,
@@ -206,12 +207,7 @@ def _ways(
 
 
 def _reaches(start: State, way: Skeleton, objective: Objective, symbols: Symbols) -> bool:
-    state = start
-    for action in way:
-        if action not in applicable_actions(state, symbols):
-            return False
-        state = successor(state, action)
-    return satisfied(state, objective)
+    return are_applicable(way, start, symbols) and satisfied(progress(start, way), objective)
 
 
 class Laboratory(Execution):

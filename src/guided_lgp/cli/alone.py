@@ -1,6 +1,5 @@
 """One run of a stage at a time in a clone."""
 
-import fcntl
 import os
 import platform
 import time
@@ -9,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from urllib.parse import quote
 
+from guided_lgp.cache import lock_at_once
 from guided_lgp.errors import InputError
 
 PATIENCE_S = 5.0
@@ -50,7 +50,7 @@ def alone(root: Path, stage: str) -> Iterator[None]:
 def _lock(descriptor: int, stage: str) -> None:
     """Take the lock and leave this process's name in it."""
     until = time.monotonic() + PATIENCE_S
-    while not _is_taken(descriptor):
+    while not lock_at_once(descriptor):
         if time.monotonic() > until:
             holder = os.pread(descriptor, 200, 0).decode(errors="replace").strip()
             fault = f"runs already in this clone: {holder or 'process unknown'}"
@@ -58,13 +58,3 @@ def _lock(descriptor: int, stage: str) -> None:
         time.sleep(_LOOK_S)
     os.ftruncate(descriptor, 0)
     os.pwrite(descriptor, f"process {os.getpid()} on {platform.node()}\n".encode(), 0)
-
-
-def _is_taken(descriptor: int) -> bool:
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    except OSError:  # a file system without locks
-        return True
-    return True

@@ -14,7 +14,7 @@ from guided_lgp.logic.objectives import (
     unsatisfied,
     validate_objective,
 )
-from guided_lgp.logic.progression import applicable_actions, progress, successor
+from guided_lgp.logic.progression import applicable_actions, are_applicable, progress, successor
 from guided_lgp.logic.state import GroundAtom, State
 from guided_lgp.logic.symbols import Symbols
 
@@ -30,6 +30,7 @@ __all__ = [
     "State",
     "Symbols",
     "applicable_actions",
+    "are_applicable",
     "contradiction",
     "format_objective",
     "format_skeleton",

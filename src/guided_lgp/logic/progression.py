@@ -29,3 +29,12 @@ def progress(state: State, actions: Iterable[Action]) -> State:
     for action in actions:
         state = successor(state, action)
     return state
+
+
+def are_applicable(actions: Iterable[Action], state: State, symbols: Symbols) -> bool:
+    """Whether every action of a sequence can be carried out in its turn."""
+    for action in actions:
+        if action not in applicable_actions(state, symbols):
+            return False
+        state = successor(state, action)
+    return True

@@ -12,7 +12,7 @@ from typing import Protocol
 
 import numpy as np
 
-from guided_lgp.compiled import load_compiled
+from guided_lgp.compiled import address, load_compiled
 from guided_lgp.robots.chain import Array, Chain, turn
 from guided_lgp.robots.inverse import subproblems as sub
 from guided_lgp.robots.inverse.structures import BRANCHES, Structure
@@ -120,7 +120,7 @@ class Compiled:
         poses = [np.ascontiguousarray(array) for array in (rotation, position, value)]
         q = np.empty((len(value), *self._shape))
         missing = np.empty(q.shape[:2])
-        pointers = [ctypes.c_void_p(array.ctypes.data) for array in (*poses, q, missing)]
+        pointers = [*map(address, (*poses, q, missing))]
         self._inverse(ctypes.byref(self._arm), len(value), *pointers)
         return q, missing
 
