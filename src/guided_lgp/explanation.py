@@ -4,7 +4,9 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from guided_lgp.bounds.coordination import Coordinator
 from guided_lgp.bounds.deadline import Deadline
+from guided_lgp.bounds.goals import GoalTerms
 from guided_lgp.bounds.results import CoarseResult, Failure, PathResult
 from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.logic import Action, Objective, Skeleton, State, format_skeleton, progress
@@ -55,11 +57,27 @@ class Obstacle:
 
 
 def users_bounds(
-    scene: Scene, params: BoundsParams, deadline: Deadline, objective: Objective
+    scene: Scene,
+    params: BoundsParams,
+    deadline: Deadline,
+    objective: Objective,
+    coordinate: bool = False,
+    in_order: bool = False,
 ) -> SceneBounds:
-    """Bounds for a user's plan: grips hold firmly, where the scene does not give the grasps."""
+    """Bounds for a user's plan: grips hold firmly, where the scene does not give the grasps.
+
+    Args:
+        scene: the initial configuration.
+        params: of the bounds.
+        deadline: after which they give up.
+        objective: whose terms motions keep.
+        coordinate: whether all arms move at once where they can ...
+        in_order: ... and no two actions may change places.
+    """
     firm = not any(box.grasps for box in scene.movable)
-    return SceneBounds(scene, params, deadline, objective, firm=firm)
+    goals = GoalTerms.of(objective, scene.symbols.domain)
+    shorten = Coordinator(scene, deadline, goals, in_order).shorten if coordinate else None
+    return SceneBounds(scene, params, deadline, objective, firm, shorten)
 
 
 class ObservedBounds:

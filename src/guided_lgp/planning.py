@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-from guided_lgp.bounds.coordination import CoordinatedBounds
 from guided_lgp.bounds.deadline import Deadline, OutOfTimeError
 from guided_lgp.bounds.goals import GoalTerms
 from guided_lgp.bounds.path.assembly import stay
@@ -192,19 +191,23 @@ def plan(
     if (prefix or misplaced) and not SEARCHES[planner].over_sequences:
         accepted = ", ".join(name for name, search in SEARCHES.items() if search.over_sequences)
         raise InputError("planner", f"{planner} knows neither sequences nor places", accepted)
-    scene_bounds = users_bounds(scene, params.bounds, deadline, goals)
+    bounds_of = partial(
+        users_bounds,
+        deadline=deadline,
+        objective=goals,
+        coordinate=coordinate,
+        in_order=bool(prefix),
+    )
+    scene_bounds = bounds_of(scene, params.bounds)
     if finding := TaskFacts(scene_bounds, goals, misplaced).before_search():
         return _without_search(scene, goals, None, finding)
     search, followed = _guidance(planner, policy, models, scene)
-    observe: Callable[[SceneBounds], ObservedBounds] = ObservedBounds
-    if coordinate:
-        observe = partial(_observe, deadline=deadline, objective=goals, in_order=bool(prefix))
     by_hands = candidates * 3 // 4 if coordinate and not prefix else 0
     problem = Problem(
         scene,
         goals,
         _limits(params.compare_scalability, scene, goals, prefix, max_nodes),
-        observe(scene_bounds),
+        ObservedBounds(scene_bounds),
         followed,
         parts=scene_bounds,
         misplaced=misplaced,
@@ -212,7 +215,7 @@ def plan(
         candidates=candidates - by_hands,
         deadline=deadline,
     )
-    attempts = _Attempts(problem, observe)
+    attempts = _Attempts(problem, bounds_of)
     if prefix and satisfied(progress(scene.state, prefix), goals):
         return attempts.result(_only_timed(problem))
     if not chosen:
@@ -249,10 +252,12 @@ def _only_timed(problem: Problem) -> SearchResult:
 class _Attempts:
     """A problem, and the same with further instructions where a search has asked for them."""
 
-    def __init__(self, problem: Problem, observe: Callable[[SceneBounds], ObservedBounds]) -> None:
+    def __init__(
+        self, problem: Problem, bounds_of: Callable[[Scene, BoundsParams], SceneBounds]
+    ) -> None:
         self.first = self.last = problem
         self._starts = 0
-        self._observe = observe
+        self._bounds_of = bounds_of
 
     def widened(self, params: BoundsParams) -> Problem | None:
         """The problem with further instructions, if a goal needs them and there is time to tell."""
@@ -263,12 +268,12 @@ class _Attempts:
             scene = widened_scene(problem.scene, problem.objective, params, problem.deadline)
         if scene is None:
             return None
-        bounds = users_bounds(scene, params, problem.deadline, problem.objective)
+        bounds = self._bounds_of(scene, params)
         knows = problem.policy and not missing_instructions(problem.policy, scene.symbols.domain)
         self.last = replace(
             problem,
             scene=scene,
-            bounds=self._observe(bounds),
+            bounds=ObservedBounds(bounds),
             parts=bounds,
             policy=problem.policy if knows else Uniform(),
         )
@@ -279,8 +284,8 @@ class _Attempts:
         last = self.last
         self._starts += _observed(last).starts
         more = params.model_copy(update={"coarse_restarts": PATIENCE * params.coarse_restarts})
-        bounds = users_bounds(last.scene, more, last.deadline, last.objective)
-        observed = self._observe(bounds)
+        bounds = self._bounds_of(last.scene, more)
+        observed = ObservedBounds(bounds)
         self.last = replace(last, bounds=observed, parts=bounds, widened=lambda: None)
         return self.last
 
@@ -301,13 +306,6 @@ class _Attempts:
             obstacles=() if found.solved else obstacles,
             finding=None if found.solved else _finding(problem, obstacles),
         )
-
-
-def _observe(
-    bounds: SceneBounds, deadline: Deadline, objective: Objective, in_order: bool
-) -> ObservedBounds:
-    """The bounds of a scene as the search uses them, with motions of all arms at once."""
-    return ObservedBounds(CoordinatedBounds.of(bounds, deadline, objective, in_order))
 
 
 def _observed(problem: Problem) -> ObservedBounds:

@@ -6,7 +6,6 @@ in between, all arms move at once where they are clear of each other, and jerk i
 comes of it passes the same verification.
 """
 
-from guided_lgp.bounds.coordination.bounds import CoordinatedBounds
 from guided_lgp.bounds.coordination.coordinate import Coordinator
 
-__all__ = ["CoordinatedBounds", "Coordinator"]
+__all__ = ["Coordinator"]

@@ -57,7 +57,7 @@ class Coordinator:
         """The same actions in less time; actions of two arms may change places.
 
         Args:
-            result: a motion that the path bound has found.
+            result: steps that the path bound has found, and their motion, if it is made.
 
         Returns:
             The new motion, or ``result`` where none is found in time.

@@ -1,12 +1,13 @@
 """The path bound P(a_1:K): the dense motion for a whole skeleton (paper, eq. 4)."""
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import chain, islice
 
 from guided_lgp.bounds.coarse import CoarseBound
-from guided_lgp.bounds.deadline import NEVER, Deadline
+from guided_lgp.bounds.deadline import NEVER, Deadline, OutOfTimeError
 from guided_lgp.bounds.goals import NO_TERMS, GoalTerms
 from guided_lgp.bounds.path.assembly import assemble, stay
 from guided_lgp.bounds.path.firm import firmest
@@ -16,8 +17,8 @@ from guided_lgp.bounds.path.optimise import optimise
 from guided_lgp.bounds.path.sampler import OutcomeSampler
 from guided_lgp.bounds.path.situation import Situation, Step
 from guided_lgp.bounds.path.task import FurthestFailure, Outcome, Stage, Task
-from guided_lgp.bounds.results import CoarseResult, Failure, PathResult, Trajectory
-from guided_lgp.bounds.verify import PathReport, verify_path
+from guided_lgp.bounds.results import CoarseResult, Failure, PathResult
+from guided_lgp.bounds.verify import Violation, verify_path
 from guided_lgp.logic import Skeleton
 from guided_lgp.scene import Scene
 from guided_lgp.scene.world import world_of
@@ -30,6 +31,9 @@ took less than 210, and with less effort a search that fails goes on to the next
 _VISITS = 4
 """Situations in which an action is begun, counted in the same way: of 101 searches that found a
 motion, 98 % begun at most 1.4, one 3.7."""
+
+Shorten = Callable[[PathResult], PathResult]
+"""Makes one motion of the steps of a result; returns that as it is where it finds none."""
 
 
 class PathBound:
@@ -48,6 +52,7 @@ class PathBound:
         deadline: Deadline = NEVER,
         goals: GoalTerms = NO_TERMS,
         firm: bool = False,
+        shorten: Shorten | None = None,
     ) -> None:
         """Prepare for one scene.
 
@@ -58,12 +63,13 @@ class PathBound:
             deadline: after which it gives up.
             goals: terms that the motion keeps.
             firm: whether to look for grips that hold what the hands carry.
+            shorten: what makes a motion of the steps, where it can; else one arm moves at a time.
         """
         self._scene = scene
         self._coarse = coarse
         self._solutions = solutions
         self._goals = goals
-        self._firm = firm
+        self._firm, self._shorten = firm, shorten
         self._mover = Mover(scene, _ITERATIONS, deadline)
         self._grips = {
             (gripper, box.name): grips_of(box, arm)
@@ -123,23 +129,17 @@ class PathBound:
             if arrived is None:
                 continue
             done = (step for outcome in outcomes for step in outcome.steps)
-            steps = [*first, *done, *arrived[0]]
-            trajectory, report = self._verified(task, skeleton, steps)
-            if report.violation is not None:
-                fault = report.violation
-                furthest.record(fault.action, Stage.VERIFICATION, fault.constraint)
-                continue
-            yield PathResult(
+            found = PathResult(
                 skeleton,
                 feasible=True,
-                trajectory=trajectory,
                 at_switch=tuple(outcome.contact for outcome in outcomes),
-                verification={
-                    "configurations": report.configurations,
-                    "deepest_penetration_m": report.deepest_penetration,
-                },
-                steps=tuple(steps),
+                steps=(*first, *done, *arrived[0]),
             )
+            motion = self._motion(task, found)
+            if isinstance(motion, Violation):
+                furthest.record(motion.action, Stage.VERIFICATION, motion.constraint)
+            else:
+                yield motion
 
     def rest(self) -> PathResult:
         """The plan of no actions: arms go where goals want them."""
@@ -151,23 +151,38 @@ class PathBound:
             return PathResult((), feasible=False, failure=failure)
         if not arrived[0]:
             return stay(self._scene)
-        trajectory, report = self._verified(task, (), arrived[0])
-        if report.violation is not None:
-            fault = report.violation
-            failure = Failure(0, fault.constraint, fault.amount, "verification")
+        found = PathResult((), feasible=True, steps=tuple(arrived[0]))
+        motion = self._motion(task, found)
+        if isinstance(motion, Violation):
+            failure = Failure(0, motion.constraint, motion.amount, "verification")
             return PathResult((), feasible=False, failure=failure)
-        return PathResult((), feasible=True, trajectory=trajectory, steps=tuple(arrived[0]))
+        return motion
 
-    def _verified(
-        self, task: Task, skeleton: Skeleton, steps: Sequence[Step]
-    ) -> tuple[Trajectory, PathReport]:
-        """The motion of all steps, optimised if it is still good then."""
-        for chosen in (optimise(self._mover, steps), steps):
-            trajectory = assemble(self._mover.robot, task.start, chosen)
-            report = verify_path(self._world, skeleton, trajectory, self._goals)
-            if report.violation is None:
-                break
-        return trajectory, report
+    def _motion(self, task: Task, found: PathResult) -> PathResult | Violation:
+        """The verified motion of all steps: of all arms at once, or else optimised, or as it is."""
+        if self._shorten is not None:
+            shorter = self._shorten(found)
+            if shorter.trajectory is not None:
+                return shorter
+        with suppress(OutOfTimeError):
+            motion = self._in_turn(task, found, optimise(self._mover, found.steps))
+            if isinstance(motion, PathResult):
+                return motion
+        return self._in_turn(task, found, found.steps)
+
+    def _in_turn(
+        self, task: Task, found: PathResult, steps: Sequence[Step]
+    ) -> PathResult | Violation:
+        """The verified motion of some steps one after the other."""
+        trajectory = assemble(self._mover.robot, task.start, steps)
+        report = verify_path(self._world, found.skeleton, trajectory, self._goals)
+        if report.violation is not None:
+            return report.violation
+        verification = {
+            "configurations": report.configurations,
+            "deepest_penetration_m": report.deepest_penetration,
+        }
+        return replace(found, trajectory=trajectory, verification=verification)
 
     def _search(
         self, task: Task, sampler: OutcomeSampler, limit: int, index: int, situation: Situation
