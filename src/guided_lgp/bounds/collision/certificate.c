@@ -197,32 +197,81 @@ static INLINE void pair_near(const scene *s, const pose *poses, int a, int b, fl
     vertices(&a_in_b, half_b, s->vertices + 3 * start[a], start[a + 1] - start[a], padding, near);
 }
 
-/* Values, sines and one minus cosines (count, joints) to free (count): 1 where it is sure that all
- * pairs of bodies are farther apart than the padding. */
+/* Where all bodies are in the configurations from the first on; behind the last it stays. */
+static INLINE void place(const scene *s, int first, int count, const float *value, const float *sine,
+                         const float *versine, pose *joints, pose *poses)
+{
+    for (int j = 0; j < s->joints; j++) {
+        lanes v, sn, vs;
+        for (int l = 0; l < LANES; l++) {
+            int row = first + l < count ? first + l : count - 1;
+            v[l] = value[row * s->joints + j];
+            sn[l] = sine[row * s->joints + j];
+            vs[l] = versine[row * s->joints + j];
+        }
+        joint_pose(s, j, s->parent[j] < 0 ? 0 : &joints[s->parent[j]], v, sn, vs, &joints[j]);
+    }
+    for (int i = 0; i < s->bodies; i++)
+        body_pose(s->frame + 12 * i, s->joint[i] < 0 ? 0 : &joints[s->joint[i]], &poses[i]);
+}
+
+/* Values, sines and one minus cosines (count, joints) to near (count, pairs): 1 unless it is sure
+ * that a pair of bodies is farther apart than the padding. */
 WIDEST void certify(const scene *s, int pairs, const int *pair, float padding, int count,
-             const float *value, const float *sine, const float *versine, unsigned char *free)
+             const float *value, const float *sine, const float *versine, unsigned char *near)
 {
     pose joints[s->joints], poses[s->bodies];
     for (int first = 0; first < count; first += LANES) {
-        for (int j = 0; j < s->joints; j++) {
-            lanes v, sn, vs;
-            for (int l = 0; l < LANES; l++) {
-                int row = first + l < count ? first + l : count - 1;
-                v[l] = value[row * s->joints + j];
-                sn[l] = sine[row * s->joints + j];
-                vs[l] = versine[row * s->joints + j];
-            }
-            joint_pose(s, j, s->parent[j] < 0 ? 0 : &joints[s->parent[j]], v, sn, vs, &joints[j]);
-        }
-        for (int i = 0; i < s->bodies; i++)
-            body_pose(s->frame + 12 * i, s->joint[i] < 0 ? 0 : &joints[s->joint[i]], &poses[i]);
-        int unsure[LANES] = {0}, near[LANES];
+        place(s, first, count, value, sine, versine, joints, poses);
         for (int p = 0; p < pairs; p++) {
-            pair_near(s, poses, pair[2 * p], pair[2 * p + 1], padding, near);
-            for (int l = 0; l < LANES; l++)
-                unsure[l] |= near[l];
+            int unsure[LANES];
+            pair_near(s, poses, pair[2 * p], pair[2 * p + 1], padding, unsure);
+            for (int l = 0; l < LANES && first + l < count; l++)
+                near[(long)(first + l) * pairs + p] = unsure[l];
         }
-        for (int l = 0; l < LANES && first + l < count; l++)
-            free[first + l] = !unsure[l];
+    }
+}
+
+/* Raise least to the distance of a box around the origin and one at a pose, where they are apart. */
+static INLINE void box_gap(const pose *b, const float *half_a, const float *half_b, lanes least)
+{
+    lanes apart = {0};
+    for (int r = 0; r < 3; r++)
+        for (int l = 0; l < LANES; l++) {
+            float width = fabsf(b->entry[3 * r][l]) * half_b[0] +
+                          fabsf(b->entry[3 * r + 1][l]) * half_b[1] +
+                          fabsf(b->entry[3 * r + 2][l]) * half_b[2];
+            float gap = fabsf(b->entry[9 + r][l]) - width - half_a[r];
+            gap = gap > 0 ? gap : 0;
+            apart[l] += gap * gap;
+        }
+    for (int l = 0; l < LANES; l++) {
+        float gap = sqrtf(apart[l]);
+        least[l] = gap > 0 && gap > least[l] ? gap : least[l];
+    }
+}
+
+/* The same to least (count, pairs): what the distance of a pair of bodies is at least. */
+WIDEST void gaps(const scene *s, int pairs, const int *pair, int count, const float *value,
+          const float *sine, const float *versine, float *least)
+{
+    pose joints[s->joints], poses[s->bodies];
+    for (int first = 0; first < count; first += LANES) {
+        place(s, first, count, value, sine, versine, joints, poses);
+        for (int p = 0; p < pairs; p++) {
+            int a = pair[2 * p], b = pair[2 * p + 1];
+            pose b_in_a, a_in_b;
+            relative(&poses[a], &poses[b], &b_in_a);
+            relative(&poses[b], &poses[a], &a_in_b);
+            lanes gap;
+            for (int l = 0; l < LANES; l++) {
+                float x = b_in_a.entry[9][l], y = b_in_a.entry[10][l], z = b_in_a.entry[11][l];
+                gap[l] = sqrtf(x * x + y * y + z * z) - s->radius[a] - s->radius[b];
+            }
+            box_gap(&b_in_a, s->half + 3 * a, s->half + 3 * b, gap);
+            box_gap(&a_in_b, s->half + 3 * b, s->half + 3 * a, gap);
+            for (int l = 0; l < LANES && first + l < count; l++)
+                least[(long)(first + l) * pairs + p] = gap[l];
+        }
     }
 }

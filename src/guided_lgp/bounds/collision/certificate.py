@@ -49,7 +49,7 @@ class _Body:
 
 
 class Certificate:
-    """Says of configurations in one scene whether they are surely free."""
+    """Says of configurations in one scene which bodies are surely apart."""
 
     def __init__(self, model: Any, template: Array, geometry: Any, moving: Sequence[str]) -> None:
         """Prepare a scene.
@@ -60,8 +60,7 @@ class Certificate:
             geometry: all bodies, by pinocchio; each hangs on a joint.
             moving: the joints of a configuration.
         """
-        library = _library()
-        self._certify = None if library is None else library.certify
+        self._library = _library()
         numbers = [model.getJointId(name) for name in moving]
         self._columns = np.argsort(numbers, kind="stable")  # from the root to the tips
         parents, joints, self._carriers = moving_joints(model, template, sorted(numbers))
@@ -90,27 +89,42 @@ class Certificate:
         self._joint[body] = carrier
         self._frame[body] = flat(offset @ placement @ self._boxes[body])
 
-    def free(self, values: Array, pairs: NDArray[np.intc], padding: float) -> NDArray[np.bool_]:
-        """Which configurations (m,) are surely free; none of them without a compiler.
+    def near(self, values: Array, pairs: NDArray[np.intc], padding: float) -> NDArray[np.bool_]:
+        """Which pairs (m, p) of bodies may be near each other; all of them without a compiler.
 
         Args:
             values: (m, joints) of the moving joints (rad or m).
-            pairs: (p, 2) numbers of bodies that are to be apart, contiguous.
-            padding: the distance (m) that they keep at least.
+            pairs: (p, 2) numbers of bodies, contiguous.
+            padding: the distance (m) at which they are near.
         """
-        free = np.zeros(len(values), dtype=np.bool_)
-        if self._certify is not None:
-            plain = np.ascontiguousarray(values[:, self._columns], dtype=np.float32)
-            arrays = (plain, np.sin(plain), 1 - np.cos(plain), free)
-            self._certify(
-                ctypes.byref(self._scene),
-                len(pairs),
-                address(pairs),
-                ctypes.c_float(padding + _ROUNDING),
-                len(values),
-                *map(address, arrays),
-            )
-        return free
+        near = np.ones((len(values), len(pairs)), dtype=np.bool_)
+        if self._library is not None:
+            apart = ctypes.c_float(padding + _ROUNDING)
+            self._find(self._library.certify, near, values, pairs, apart)
+        return near
+
+    def gaps(self, values: Array, pairs: NDArray[np.intc]) -> NDArray[np.float32]:
+        """What the distances (m, p) of pairs are at least (m); nothing is known without a compiler.
+
+        See :meth:`near`.
+        """
+        least = np.full((len(values), len(pairs)), -np.inf, dtype=np.float32)
+        if self._library is not None:
+            self._find(self._library.gaps, least, values, pairs)
+        return least - np.float32(_ROUNDING)
+
+    def _find(
+        self,
+        function: Any,
+        found: NDArray[Any],
+        values: Array,
+        pairs: NDArray[np.intc],
+        *options: ctypes.c_float,
+    ) -> None:
+        plain = np.ascontiguousarray(values[:, self._columns], dtype=np.float32)
+        arrays = (plain, np.sin(plain), 1 - np.cos(plain), found)
+        given = (ctypes.byref(self._scene), len(pairs), address(pairs), *options)
+        function(*given, len(values), *map(address, arrays))
 
 
 @cache

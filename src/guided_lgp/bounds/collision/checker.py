@@ -5,7 +5,7 @@ A check takes about 10 us: forward kinematics, bounding boxes of all bodies, the
 is certified as free needs none.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
 from itertools import product
@@ -16,6 +16,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from guided_lgp.bounds.collision.certificate import Certificate
+from guided_lgp.bounds.collision.nearest import Nearest
 from guided_lgp.bounds.collision.shapes import convex_shape, robot_shapes
 from guided_lgp.bounds.results import Array
 from guided_lgp.poses import IDENTITY
@@ -55,6 +56,7 @@ _Pattern = tuple[
     frozenset[str], frozenset[str], frozenset[tuple[str, str]], frozenset[frozenset[str]]
 ]
 """What decides which pairs are checked: moving arms, standing and carried boxes, contacts."""
+_NOTHING: _Pattern = (frozenset(), frozenset(), frozenset(), frozenset())
 
 
 class CollisionChecker:
@@ -89,11 +91,6 @@ class CollisionChecker:
         self._pairs = np.nonzero(np.triu(self._candidates, 1))
         for first, second in zip(*self._pairs, strict=True):
             self._geometry.addCollisionPair(pin.CollisionPair(int(first), int(second)))
-        shapes = [body.geometry for body in self._geometry.geometryObjects]
-        for shape in shapes:
-            shape.computeLocalAABB()
-        self._centres = [np.array(shape.aabb_center) for shape in shapes]
-        self._radii = np.array([shape.aabb_radius for shape in shapes])
         self._data = self._model.createData()
         self._geometry_data = self._geometry.createData()
         for request in self._geometry_data.collisionRequests:
@@ -104,7 +101,8 @@ class CollisionChecker:
         self._callback = pin.CollisionCallBackDefault(self._geometry, self._geometry_data, True)
         self.entered: PlanningScene | None = None
         """The scene that is there."""
-        self._pattern: _Pattern | None = None
+        self._pattern = self._shown = _NOTHING
+        """What was entered last, and for which coal's own search for pairs is prepared."""
         self._patterns: dict[_Pattern, tuple[NDArray[np.bool_], list[int], NDArray[np.intc]]] = {}
         self._active: list[int] = []
         self._apart = np.empty((0, 2), dtype=np.intc)
@@ -115,24 +113,20 @@ class CollisionChecker:
         self._template = pin.neutral(self._model)
         for name, value in scene.robot.fixed_values.items():
             self._template[self._coordinate(name)] = value
-        at = np.array([self._coordinate(joint) for joint in robot.joint_names])
+        moving = robot.moving_joints
+        at = np.array([self._coordinate(joint) for joint in moving])
         self._turning = np.array(robot.continuous, dtype=int)
         self._plain = np.setdiff1d(np.arange(len(at)), self._turning)
         self._plain_at, self._cosine_at = at[self._plain], at[self._turning]
-        self._velocity_at = [
-            int(self._model.joints[self._model.getJointId(joint)].idx_v)
-            for joint in robot.joint_names
-        ]
-        self._certificate = Certificate(
-            self._model, self._template, self._geometry, robot.moving_joints
+        self._certificate = Certificate(self._model, self._template, self._geometry, moving)
+        self._nearest = Nearest(
+            self._model,
+            self._geometry,
+            [self._model.joints[self._model.getJointId(j)].idx_v for j in robot.joint_names],
         )
         self._yield_where_near(scene)
-        self._moving = len(robot.moving_joints)
+        self._moving = len(moving)
         self._fingers = {gripper: arm.fingers for gripper, arm in robot.arms.items()}
-        self._finger_at = {
-            gripper: np.array([self._coordinate(joint) for joint in fingers.joints], dtype=int)
-            for gripper, fingers in self._fingers.items()
-        }
 
     def _yield_where_near(self, scene: Scene) -> None:
         """What stands side by side at the start may be lifted off as near as it is."""
@@ -175,8 +169,7 @@ class CollisionChecker:
                 apart = np.stack(self._pairs, axis=1)[numbers].astype(np.intc)
                 self._patterns[pattern] = active, numbers.tolist(), apart
             self._pattern = pattern
-            active, self._active, self._apart = self._patterns[pattern]
-            self._geometry_data.setActiveCollisionPairs(self._geometry, active, True)
+            _, self._active, self._apart = self._patterns[pattern]
 
     def _active_pairs(self, scene: PlanningScene) -> NDArray[np.bool_]:
         """Pairs of shapes of which one moves, but for declared contacts and what moves together."""
@@ -203,54 +196,6 @@ class CollisionChecker:
             active[np.ix_(first, second)] = active[np.ix_(second, first)] = False
         return np.asarray(active)
 
-    def coordinates(self, q: Array, fingers: Mapping[str, float]) -> Array:
-        """Coordinates of the pinocchio model (m, nq) for configurations (m, n)."""
-        full = np.empty((len(q), len(self._template)))
-        full[:] = self._template
-        full[:, self._plain_at] = q[:, self._plain]
-        angles = q[:, self._turning]
-        full[:, self._cosine_at] = np.cos(angles)
-        full[:, self._cosine_at + 1] = np.sin(angles)
-        for gripper, value in fingers.items():
-            full[:, self._finger_at[gripper]] = value * self._fingers[gripper].ratios
-        return full
-
-    def first_collision(self, q: Array, fingers: Mapping[str, float]) -> tuple[str, str] | None:
-        """The first pair of bodies found in collision along configurations (m, n), if any.
-
-        The configurations are visited from coarse to fine: ends, middle, quarters, …
-        """
-        self.queries += 1
-        rows = np.array(_coarse_to_fine(len(q)))
-        if len(rows) > _FEW:
-            rows = rows[~self.certified(self.moving_joints(q[rows], fingers))]
-        coordinates = self.coordinates(q, fingers)
-        found = (self._collision(coordinates[row]) for row in rows)
-        return next(filter(None, found), None)
-
-    def _collision(self, coordinates: Array) -> tuple[str, str] | None:
-        if not pin.computeCollisions(
-            self._model, self._data, self._broad, self._callback, coordinates
-        ):
-            return None
-        pair = self._geometry.collisionPairs[self._callback.collisionPairIndex]
-        return self._names[pair.first], self._names[pair.second]
-
-    def certified(self, moving: Array) -> NDArray[np.bool_]:
-        """Which rows (m, joints) of all moving joints are surely free; see :class:`Certificate`."""
-        return self._certificate.free(moving, self._apart, PADDING)
-
-    def free(self, moving: Array) -> NDArray[np.bool_]:
-        """Which rows (m, joints) of all moving joints are free; coal decides what is not sure."""
-        free = self.certified(moving)
-        unsure = np.flatnonzero(~free)
-        coordinates = self.coordinates(moving[unsure, : len(self._robot.joint_names)], {})
-        for gripper, hand in self._fingers.items():
-            values = moving[unsure, hand.slice][:, :1] / hand.ratios[:1]  # none of fixed jaws
-            coordinates[:, self._finger_at[gripper]] = values * hand.ratios
-        free[unsure] = [self._collision(row) is None for row in coordinates]
-        return free
-
     def moving_joints(self, q: Array, fingers: Mapping[str, float]) -> Array:
         """Rows (m, joints) of all moving joints for configurations (m, n)."""
         moving = np.empty((len(q), self._moving))
@@ -258,6 +203,66 @@ class CollisionChecker:
         for gripper, hand in self._fingers.items():
             moving[:, hand.slice] = fingers.get(gripper, 0.0) * hand.ratios
         return moving
+
+    def first_collision(self, q: Array, fingers: Mapping[str, float]) -> tuple[str, str] | None:
+        """The first pair of bodies found in collision along configurations (m, n), if any.
+
+        The configurations are visited from coarse to fine: ends, middle, quarters, …
+        """
+        self.queries += 1
+        moving = self.moving_joints(q[_coarse_to_fine(len(q))], fingers)
+        return next((pair for _, pair in self.collisions(moving)), None)
+
+    def collisions(self, moving: Array) -> Iterator[tuple[int, tuple[str, str]]]:
+        """The rows (m, joints) of all moving joints in collision, and the first pair in each.
+
+        Coal decides of what is not certified as free.
+        """
+        if len(moving) <= _FEW:
+            unsure = np.arange(len(moving))
+            pairs = map(self._first_of_all, self._coordinates(moving))
+        else:
+            near = self._certificate.near(moving, self._apart, PADDING)
+            unsure = np.flatnonzero(near.any(axis=1))
+            pairs = map(self._first_of, self._coordinates(moving[unsure]), near[unsure])
+        yield from ((row, pair) for row, pair in zip(unsure.tolist(), pairs, strict=True) if pair)
+
+    def _first_of_all(self, coordinates: Array) -> tuple[str, str] | None:
+        """The first pair of bodies in collision."""
+        if self._shown != self._pattern:
+            active, *_ = self._patterns[self._pattern]
+            self._geometry_data.setActiveCollisionPairs(self._geometry, active, True)
+            self._shown = self._pattern
+        if not pin.computeCollisions(
+            self._model, self._data, self._broad, self._callback, coordinates
+        ):
+            return None
+        return self._named(self._callback.collisionPairIndex)
+
+    def _first_of(self, coordinates: Array, near: NDArray[np.bool_]) -> tuple[str, str] | None:
+        """The same, of those pairs (p,) alone that may be near each other."""
+        pin.updateGeometryPlacements(
+            self._model, self._data, self._geometry, self._geometry_data, coordinates
+        )
+        for place in np.flatnonzero(near).tolist():
+            if pin.computeCollision(self._geometry, self._geometry_data, self._active[place]):
+                return self._named(self._active[place])
+        return None
+
+    def _named(self, pair: int) -> tuple[str, str]:
+        bodies = self._geometry.collisionPairs[pair]
+        return self._names[bodies.first], self._names[bodies.second]
+
+    def certified(self, moving: Array) -> NDArray[np.bool_]:
+        """Which rows (m, joints) of all moving joints are surely free; see :class:`Certificate`."""
+        near = self._certificate.near(moving, self._apart, PADDING)
+        return np.asarray(~near.any(axis=1))
+
+    def free(self, moving: Array) -> NDArray[np.bool_]:
+        """Which rows (m, joints) of all moving joints are free."""
+        free = np.ones(len(moving), dtype=np.bool_)
+        free[[row for row, _ in self.collisions(moving)]] = False
+        return free
 
     def distances(self, q: Array, fingers: Mapping[str, float], count: int) -> tuple[Array, Array]:
         """The smallest distances of pairs of bodies, to first order.
@@ -271,49 +276,18 @@ class CollisionChecker:
             distances (m, count) in m, negative where bodies penetrate, and their gradients
             (m, count, n) in m/rad.
         """
-        values, gradients = np.empty((len(q), count)), np.empty((len(q), count, q.shape[1]))
-        for row, coordinates in enumerate(self.coordinates(q, fingers)):
-            pin.computeJointJacobians(self._model, self._data, coordinates)
-            pin.updateGeometryPlacements(
-                self._model, self._data, self._geometry, self._geometry_data
-            )
-            for column, (distance, pair) in enumerate(self._nearest(count)):
-                values[row, column] = distance
-                gradients[row, column] = self._gradient(pair)
-        return values, gradients
+        moving = self.moving_joints(q, fingers)
+        least = self._certificate.gaps(moving, self._apart)
+        return self._nearest.distances(self._coordinates(moving), self._active, least, count)
 
-    def _nearest(self, count: int) -> list[tuple[float, int]]:
-        """Distance and number of the nearest pairs, of those whose spheres are near enough."""
-        spheres = zip(self._geometry_data.oMg, self._centres, strict=True)
-        centres = np.array([placement.act(centre) for placement, centre in spheres])
-        first, second = self._apart.T
-        between = np.linalg.norm(centres[first] - centres[second], axis=1)
-        least = (between - self._radii[first] - self._radii[second]).tolist()
-        found: list[tuple[float, int]] = []
-        for place in np.argsort(least, kind="stable"):
-            if len(found) >= count and least[place] > found[count - 1][0]:
-                break
-            pair = self._active[place]
-            result = pin.computeDistance(self._geometry, self._geometry_data, pair)
-            found = sorted([*found, (result.min_distance, pair)])
-        return found[:count]
-
-    def _gradient(self, pair: int) -> Array:
-        """Derivative (n,) of the distance of a pair of bodies, at their nearest points."""
-        result = self._geometry_data.distanceResults[pair]
-        bodies = self._geometry.collisionPairs[pair]
-        rates = []
-        for body, point in (
-            (bodies.first, result.getNearestPoint1()),
-            (bodies.second, result.getNearestPoint2()),
-        ):
-            joint = self._geometry.geometryObjects[body].parentJoint
-            jacobian = pin.getJointJacobian(
-                self._model, self._data, joint, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-            )[:, self._velocity_at]
-            arm = pin.skew(point - self._data.oMi[joint].translation) @ result.normal
-            rates.append(result.normal @ jacobian[:3] + arm @ jacobian[3:])
-        return np.asarray(rates[1] - rates[0])
+    def _coordinates(self, moving: Array) -> Array:
+        """Coordinates of the pinocchio model (m, nq) for rows (m, joints) of all moving joints."""
+        full = np.empty((len(moving), len(self._template)))
+        full[:] = self._template
+        full[:, self._plain_at] = moving[:, self._plain]
+        angles = moving[:, self._turning]
+        full[:, self._cosine_at], full[:, self._cosine_at + 1] = np.cos(angles), np.sin(angles)
+        return full
 
     def _add(self, name: str, joint: int, placement: Any, shape: Any) -> None:
         self._geometry.addGeometryObject(pin.GeometryObject(name, joint, placement, shape))
@@ -377,8 +351,11 @@ def checker_of(scene: Scene) -> CollisionChecker:
 
 
 @cache
-def _coarse_to_fine(count: int) -> tuple[int, ...]:
+def _coarse_to_fine(count: int) -> NDArray[np.intp]:
     """The numbers below ``count``: last, first, then halving the gaps (bit reversal)."""
     bits = max(count - 1, 1).bit_length()
-    reversed_ = (int(f"{i:0{bits}b}"[::-1], 2) for i in range(1 << bits))
-    return tuple(dict.fromkeys([count - 1, *(i for i in reversed_ if i < count)]))
+    numbers = np.arange(1 << bits)
+    mirrored = [((numbers >> bit) & 1) << (bits - 1 - bit) for bit in range(bits)]
+    order = np.sum(mirrored, axis=0)
+    order = order[order < count]
+    return np.concatenate([[count - 1], order[order != count - 1]])
