@@ -26,7 +26,7 @@ from guided_lgp.scene import generate
 
 ROOT = Path(__file__).parents[1]
 BASELINE = "50577ca"
-"""The version that all later ones are measured against."""
+"""Version 0.1.0, which all later ones are measured against."""
 VERSIONS = ("old", "new")
 LENGTHS = tuple(range(2, 11))
 SEED = 20_004

@@ -62,7 +62,7 @@ def plan(
         str,
         typer.Option(
             parser=one_of(SEARCHES),
-            metavar=f"[{'|'.join(SEARCHES)}]",
+            metavar="PLANNER",
             help="How to search. "
             + "; ".join(f"{name}: {search.summary}" for name, search in SEARCHES.items())
             + ".",
@@ -72,7 +72,7 @@ def plan(
         str,
         typer.Option(
             parser=one_of(POLICIES),
-            metavar=f"[{'|'.join(POLICIES)}]",
+            metavar="POLICY",
             help="Which trained policy. "
             + "; ".join(f"{name}: {declared.summary}" for name, declared in POLICIES.items())
             + ".",
@@ -82,8 +82,8 @@ def plan(
         str | None,
         typer.Option(
             parser=one_of(domain_names()),
-            metavar=f"[{'|'.join(domain_names())}]",
-            help="Whose instructions the plan may have.",
+            metavar="DOMAIN",
+            help=f"Whose instructions the plan may have: {' or '.join(domain_names())}.",
             show_default="that of SCENE; or else the paper's, and more where a goal needs them",
         ),
     ] = None,
@@ -105,15 +105,15 @@ def plan(
             "one of the fewest actions, of several the one of the shortest duration.",
         ),
     ] = 1,
-    coordinate: Annotated[
+    one_at_a_time: Annotated[
         bool,
         typer.Option(
-            "--coordinate/--no-coordinate",
-            help="Let all arms move at once, with limited jerk and without ways home that are not "
-            "needed; actions of two arms may change places, unless they are given. Or one arm at "
-            "a time.",
+            "--no-coordinate",
+            help="Move one arm at a time, and home after each action.",
+            show_default="all at once, with limited jerk; actions of two arms may change places, "
+            "unless they are given",
         ),
-    ] = True,
+    ] = False,
     max_nodes: Annotated[
         int | None,
         typer.Option(
@@ -207,7 +207,7 @@ def plan(
             domain=domain,
             skeleton=skeleton or (),
             candidates=candidates,
-            coordinate=coordinate,
+            coordinate=not one_at_a_time,
             where=str(scene),
         )
     start, objective = result.scene, result.objective

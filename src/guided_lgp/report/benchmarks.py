@@ -84,7 +84,7 @@ def _against(metrics: Metrics) -> Table:
     step = metrics["coarse_step"]
     return Table(
         "against",
-        f"This version against {metrics['baseline']}",
+        f"This version against version 0.1.0 ({metrics['baseline']})",
         ("What", "old (ms)", "new (ms)", "times faster", "n"),
         tuple(
             (

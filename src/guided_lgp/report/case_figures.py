@@ -23,6 +23,9 @@ _DRAWN: dict[str, dict[str, Any]] = {
 """Rivals and the policy, greedy (dashed) and complete; the tables have the controls, too."""
 
 _MARGIN = 0.15
+_LIMITS = 3, 120
+_TICKS = 5, 10, 20, 50, 100
+"""Calls, on an axis where equal distances are equal factors: they say what a policy saves."""
 
 
 @mpl.rc_context(STYLE)
@@ -32,14 +35,17 @@ def calls(cases: Metrics) -> Figure:
     Args:
         cases: by case, size and planner; a search without a plan counts with the limit.
     """
-    figure, axes = subplots(len(cases), 1, WIDTH, 1.0 + 1.8 * len(cases))
+    figure, axes = subplots(len(cases), 1, WIDTH, 1.0 + 2.0 * len(cases))
     every_size = sorted({int(size) for sizes in cases.values() for size in sizes})
     for axis, (name, sizes) in zip(axes[:, 0], cases.items(), strict=True):
         axis.set_title(TITLES.get(name, name))
-        axis.set_ylabel("Calls, limit 100")
+        axis.set_ylabel("Calls to a plan")
         for planner, style in _DRAWN.items():
             _curve(axis, planner, style, sizes)
-        axis.set_ylim(bottom=0)
+        axis.set_yscale("log")
+        axis.set_ylim(_LIMITS)
+        axis.set_yticks(_TICKS, list(map(str, _TICKS)))
+        axis.minorticks_off()
         axis.set_xlim(every_size[0] - _MARGIN, every_size[-1] + _MARGIN)
         axis.set_xticks(every_size)
     axes[-1, 0].set_xlabel("Boxes")

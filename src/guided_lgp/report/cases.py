@@ -15,7 +15,7 @@ QUESTION = (
     "best searches without one?"
 )
 _HALF = 0.5
-_COLUMNS = ("solved, %", "worst", "calls", "infeasible", "failed")
+_COLUMNS = ("solved", "worst", "calls", "infeasible", "failed")
 """Of one size."""
 
 
@@ -131,9 +131,9 @@ def headline(sizes: Metrics) -> str:
 _CALLS = ("calls", "rival_calls")
 
 
-def answers(compared: Mapping[str, Metrics]) -> list[str]:
+def answers(compared: Mapping[str, Metrics]) -> dict[str, str]:
     """Case by case, whether learning is worth it."""
-    return [f"{TITLES.get(name, name)}: {_verdict(sizes)}" for name, sizes in compared.items()]
+    return {TITLES.get(name, name): _verdict(sizes) for name, sizes in compared.items()}
 
 
 def _verdict(sizes: Mapping[str, Metrics]) -> str:
@@ -142,7 +142,7 @@ def _verdict(sizes: Mapping[str, Metrics]) -> str:
     amount, where = "at most" if half else "more than", "at every size"
     if half and more:
         where = f"with {_listed(half)} boxes, and more with {_listed(more)}"
-    text = f"the policy needs {amount} half the calls of the best search without one {where}."
+    text = f"The policy needs {amount} half the calls of the best search without one {where}."
     if convenient:
         text += (
             " Where many problems share a scene, so that its facts cost nothing, a search that "

@@ -6,6 +6,7 @@ from guided_lgp.params import Params
 from guided_lgp.policy.registry import TRAINED_POLICIES
 from guided_lgp.report import cases, findings
 from guided_lgp.report.document import (
+    Answers,
     Block,
     Bullets,
     Document,
@@ -99,7 +100,7 @@ def compose(
     ]
     policy: list[Block] = [
         tables["training"],
-        "Losses by epoch: “dvc plots show”, or the dashboard.",
+        "Losses by epoch: “dvc plots show”, or MLflow.",
         Picture(
             "confusion.svg",
             "Where sub-policies err",
@@ -128,9 +129,9 @@ def compose(
         geometry.append(tables["geometry"])
     answers = findings.answers(inputs.generalization, inputs.scalability, inputs.timing)
     if rows := (inputs.cases_compared or {}).get("rows"):
-        answers.append(f"Where geometry decides, as in crowded rows: {cases.headline(rows)}")
+        answers["Where geometry decides"] = f"In crowded rows {cases.headline(rows)}"
     sections = [
-        Section("Question and answer", [findings.QUESTION, Bullets(answers)]),
+        Section("Question and answer", [findings.QUESTION, Answers(answers)]),
         Section("Generalization", generalization),
         Section("Scalability", scalability),
         Section("Policy", policy),
@@ -157,7 +158,7 @@ def _cases(inputs: Inputs, tables: Mapping[str, Table]) -> Iterator[Block]:
     assert inputs.cases is not None
     assert inputs.cases_compared is not None
     yield cases.QUESTION
-    yield Bullets(cases.answers(inputs.cases_compared))
+    yield Answers(cases.answers(inputs.cases_compared))
     yield tables["cases_compared"]
     yield Picture(
         "cases.svg",

@@ -1,7 +1,7 @@
 """The report as headings, paragraphs, tables and pictures, written as Markdown and as HTML."""
 
 from base64 import b64encode
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -17,6 +17,13 @@ class Bullets:
     """A list of sentences."""
 
     items: Sequence[str]
+
+
+@dataclass(frozen=True)
+class Answers:
+    """A list of answers, each by what it is about."""
+
+    items: Mapping[str, str]
 
 
 @dataclass(frozen=True)
@@ -53,6 +60,7 @@ class Folded:
 _KINDS = {
     "paragraph": str,
     "bullets": Bullets,
+    "answers": Answers,
     "table": Table,
     "folded": Folded,
     "picture": Picture,
@@ -61,7 +69,7 @@ _KINDS = {
 }
 """How the templates call the kinds of blocks."""
 
-Block = str | Bullets | Table | Folded | Picture | Gallery | Links
+Block = str | Bullets | Answers | Table | Folded | Picture | Gallery | Links
 
 
 @dataclass(frozen=True)

@@ -66,7 +66,7 @@ def confusion(matrices: Mapping[str, Mapping[str, tuple[Sequence[str], np.ndarra
     """
     policies = list(dict.fromkeys(policy for row in matrices.values() for policy in row))
     sizes = [len(next(iter(row.values()))[0]) for row in matrices.values()]
-    height = 0.6 + sum(0.75 + 0.3 * size for size in sizes)
+    height = 0.9 + sum(0.6 + 0.3 * size for size in sizes)
     figure, axes = subplots(
         len(matrices), len(policies), WIDTH, height, height_ratios=[size + 1.5 for size in sizes]
     )
@@ -78,10 +78,11 @@ def confusion(matrices: Mapping[str, Mapping[str, tuple[Sequence[str], np.ndarra
                 shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
                 texts = [[f"{100 * share:.0f}" for share in line] for line in shares]
                 _heat(axis, shares, labels, labels, texts)
-                axis.set_title(f"{title.replace(': ', ', ')}\n(n = {int(counts.sum()):,})")
+                axis.set_title(f"{title.replace(': ', ', ')} (n = {int(counts.sum()):,})")
         row[0].set_ylabel("in the data")
-    for axis, policy in zip(axes[-1], policies, strict=True):
-        axis.set_xlabel(f"predicted\n{POLICIES[policy]}")
+    for top, bottom, policy in zip(axes[0], axes[-1], policies, strict=True):
+        top.set_title(f"{POLICIES[policy]}\n\n{top.get_title()}")
+        bottom.set_xlabel("predicted")
     return figure
 
 

@@ -18,19 +18,19 @@ QUESTION = (
 )
 
 
-def answers(generalization: Metrics, scalability: Metrics, timing: Metrics) -> list[str]:
+def answers(generalization: Metrics, scalability: Metrics, timing: Metrics) -> dict[str, str]:
     """What the tables say to :data:`QUESTION`, in four sentences with their figures."""
     printed = paper.GENERALIZATION[PAPERS.table_1]
     ours, best, control = (generalization[row.table_1] for row in (PAPERS, BEST, CONTROL))
-    return [
-        "New scenes and goals. With the paper's networks the plan is a shortest one in "
+    return {
+        "New scenes and goals": "With the paper's networks the plan is a shortest one in "
         f"{pair(ours)} of the problems, over all and over unseen objectives (paper: "
         f"{pair(printed)}); with the relational policy in {pair(best)}.",
-        "Without a policy. Best-first search, whose cost counts the actions still needed, finds a "
-        f"shortest plan in {pair(control)} of the same problems.",
-        f"Size of the tree. {tree(scalability, timing)}",
-        f"Longer tasks. {many(scalability)}",
-    ]
+        "Without a policy": "Best-first search, whose cost counts the actions still needed, finds "
+        f"a shortest plan in {pair(control)} of the same problems.",
+        "Size of the tree": tree(scalability, timing),
+        "Longer tasks": many(scalability),
+    }
 
 
 def tree(metrics: Metrics, timing: Metrics) -> str:

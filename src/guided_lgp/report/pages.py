@@ -99,7 +99,7 @@ def _rows(sizes: Metrics) -> list[str]:
     """What learning is worth where geometry decides, once ``make cases`` has run."""
     if not sizes:
         return []
-    return [f"Where geometry decides, as in [crowded rows](docs/cases.md), {headline(sizes)}", ""]
+    return [f"Where geometry decides, in [crowded rows](docs/cases.md), {headline(sizes)}", ""]
 
 
 def _shares(shares: Metrics) -> list[str]:
