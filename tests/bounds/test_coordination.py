@@ -158,25 +158,6 @@ def test_the_time_law_keeps_velocity_acceleration_and_jerk(slower: float) -> Non
     assert len(rows) > len(jerk_limited(path, arm)) - 1
 
 
-BENT = (
-    (-0.4971, -0.0544, -0.9761, -1.5957, -1.6871, -1.6826, 0.5542),
-    (-0.4887, -0.0855, -0.9768, -1.6226, -1.6462, -1.6975, 0.5647),
-    (-0.4801, -0.1145, -0.9787, -1.6515, -1.6067, -1.7119, 0.5759),
-    (-0.4713, -0.1401, -0.9826, -1.6839, -1.5696, -1.7259, 0.5884),
-    (-0.4620, -0.1586, -0.9897, -1.7237, -1.5376, -1.7394, 0.6032),
-    (-0.4520, -0.1653, -1.0022, -1.7758, -1.5143, -1.7523, 0.6219),
-    (-0.4479, -0.1386, -1.0162, -1.8172, -1.5303, -1.7549, 0.6346),
-)
-"""Half a second of motion whose fastest law forwards stops before its last bend: 8,955 s."""
-
-
-def test_an_arm_does_not_creep_through_a_bend_that_it_cannot_take_forwards() -> None:
-    path, arm = np.array(BENT), PR2.arms["pr2L"]
-    rows = jerk_limited(path, arm)
-    assert len(rows) * TICK < 1.0
-    np.testing.assert_array_equal(rows[[0, -1]], path[[0, -1]])
-
-
 def test_fingers_start_and_stop_gently() -> None:
     fingers = PR2.arms["pr2L"].fingers
     values = ramp(fingers, 0.1, 0.3)

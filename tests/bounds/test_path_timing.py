@@ -54,6 +54,26 @@ def test_a_tiny_motion_still_arrives() -> None:
     assert time_path(ends, ARM)[1][[0, -1]].tolist() == ends.tolist()
 
 
+BENT = (
+    (-0.4971, -0.0544, -0.9761, -1.5957, -1.6871, -1.6826, 0.5542),
+    (-0.4887, -0.0855, -0.9768, -1.6226, -1.6462, -1.6975, 0.5647),
+    (-0.4801, -0.1145, -0.9787, -1.6515, -1.6067, -1.7119, 0.5759),
+    (-0.4713, -0.1401, -0.9826, -1.6839, -1.5696, -1.7259, 0.5884),
+    (-0.4620, -0.1586, -0.9897, -1.7237, -1.5376, -1.7394, 0.6032),
+    (-0.4520, -0.1653, -1.0022, -1.7758, -1.5143, -1.7523, 0.6219),
+    (-0.4479, -0.1386, -1.0162, -1.8172, -1.5303, -1.7549, 0.6346),
+)
+"""Half a second of motion whose fastest law forwards stops before its last bend: 8,955 s."""
+
+
+def test_an_arm_does_not_creep_through_a_bend_that_it_cannot_take_forwards() -> None:
+    path = np.array(BENT)
+    (times, rows), (times_back, _) = time_path(path, ARM), time_path(path[::-1], ARM)
+    assert times[-1] < 1.0
+    assert times[-1] == pytest.approx(times_back[-1], rel=0.1)
+    np.testing.assert_array_equal(rows[[0, -1]], path[[0, -1]])
+
+
 def test_no_motion_takes_no_time() -> None:
     times, rows = time_path(np.stack([ARM.home, ARM.home]), ARM)
     assert times.tolist() == [0.0]

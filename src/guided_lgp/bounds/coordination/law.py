@@ -24,8 +24,6 @@ _SHARE = 0.99
 """Share of the limits that is used, so that the rounded rows keep them too."""
 _SMOOTHER = 0.85
 """Share of the fastest law's time that is tried first: means do not reach its peaks."""
-_CREEPING = 1e-3
-"""Velocity (m/s of the arm's motion) below which it creeps: 4 cm then take 20 s and more."""
 _FINGER_SHARE = 0.97
 """Share of their velocity limit at which fingers move."""
 
@@ -42,22 +40,7 @@ def jerk_limited(path: Array, arm: Arm, slower: float = 1.0) -> Array:
         Configurations (T, n), one per tick.
     """
     law = fastest_law(path, arm, _SHARE)
-    if law.duration == 0.0:
-        return law.path
-    if _creeps(law):
-        back = fastest_law(path[::-1], arm, _SHARE)
-        if back.duration < law.duration:
-            return _followed(back, arm, slower)[::-1]
-    return _followed(law, arm, slower)
-
-
-def _creeps(law: Law) -> bool:
-    """Whether an arm nearly stops on its way.
-
-    Of the laws on a grid the one that is always as fast as it can be may run into a bend at which
-    it can only stop. Backwards it comes from the other side, and most often does not.
-    """
-    return bool(law.speeds[1:-1].min(initial=np.inf) < _CREEPING)
+    return law.path if law.duration == 0.0 else _followed(law, arm, slower)
 
 
 def _followed(law: Law, arm: Arm, slower: float) -> Array:

@@ -35,6 +35,8 @@ _NEAR = 1e-4
 both would bend between them so sharply that the arm had to creep."""
 _SLOWEST = 1e-10
 """Squared path velocity (m^2/s^2) between the ends, at least: rounding must not bring a stop."""
+_CREEPING = 1e-3
+"""Path velocity (m/s) below which an arm creeps: 4 cm then take 20 s and more."""
 _STILL = 1e-10
 """Derivative (rad/m) below which a joint does not move along the path."""
 
@@ -97,9 +99,29 @@ def fastest_law(path: Array, arm: Arm, share: float) -> Law:
     curve = Cubic(s, path)
     velocity, acceleration = share * arm.velocity_limits, share * arm.acceleration_limits
     grid = np.linspace(0.0, s[-1], max(10, int(s[-1] / _GRID_STEP)))
-    speeds = np.sqrt(fastest(grid, *curve.derivatives(grid), velocity, acceleration))
-    moments = np.concatenate([[0.0], np.cumsum(2 * np.diff(grid) / (speeds[1:] + speeds[:-1]))])
-    return Law(path, curve, grid, speeds, moments)
+    speeds = _speeds(grid, *curve.derivatives(grid), velocity, acceleration)
+    return Law(path, curve, grid, speeds, _moments(grid, speeds))
+
+
+def _speeds(
+    grid: Array, slopes: Array, bends: Array, velocity: Array, acceleration: Array
+) -> Array:
+    """The path velocities (N + 1,) of the fastest law, with the arguments of :func:`fastest`.
+
+    Of the laws on a grid, the one that is always as fast as it can be may run into a bend at which
+    it can only stop. Backwards it comes from the other side, and most often does not.
+    """
+    speeds = np.sqrt(fastest(grid, slopes, bends, velocity, acceleration))
+    if speeds[1:-1].min() >= _CREEPING:
+        return speeds
+    turned = grid[-1] - grid[::-1], -slopes[::-1], np.ascontiguousarray(bends[::-1])
+    back = np.sqrt(fastest(*turned, velocity, acceleration))[::-1]
+    return min(speeds, back, key=lambda found: _moments(grid, found)[-1])
+
+
+def _moments(grid: Array, speeds: Array) -> Array:
+    """When (N + 1,) a law is at its grid points."""
+    return np.concatenate([[0.0], np.cumsum(2 * np.diff(grid) / (speeds[1:] + speeds[:-1]))])
 
 
 def fastest(
