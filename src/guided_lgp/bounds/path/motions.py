@@ -32,6 +32,10 @@ _SHORTCUTS = 12
 """Random shortcuts tried on a path of the sampling planner."""
 
 
+Pair = tuple[str, str]
+"""Two bodies in collision."""
+
+
 @dataclass(frozen=True)
 class Surroundings:
     """What stands still while one arm moves: the bodies, the other arms, the fingers."""
@@ -118,9 +122,17 @@ class Mover:
         """Collision queries so far: the measure of effort."""
         return self._checker.queries
 
-    def collision(self, surroundings: Surroundings, q: Array) -> tuple[str, str] | None:
+    def count(self) -> None:
+        """Count a query that :meth:`collisions` has answered before."""
+        self._checker.queries += 1
+
+    def collision(self, surroundings: Surroundings, q: Array) -> Pair | None:
         """The first pair of bodies in collision along configurations (m, n) of the moving arm."""
         return self._space(surroundings).collision(q)
+
+    def collisions(self, surroundings: Surroundings, q: Array) -> list[Pair | None]:
+        """The first pair in each of some configurations (m, n); these queries are not counted."""
+        return self._space(surroundings).collisions(q)
 
     def distances(self, surroundings: Surroundings, q: Array, count: int) -> tuple[Array, Array]:
         """Smallest distances (m, count) in m along configurations (m, n) of the moving arm, and
@@ -134,7 +146,7 @@ class Mover:
         tool: Tool,
         direction: Array,
         shift: float = 0.0,
-    ) -> Array | tuple[str, str] | None:
+    ) -> Array | Pair | None:
         """A free straight line of the tool, which does not turn.
 
         Args:

@@ -13,6 +13,7 @@ import numpy as np
 
 from guided_lgp.bounds.path.contacts import Contacts, ContactSampler
 from guided_lgp.bounds.path.motions import Motion, Surroundings, Tool
+from guided_lgp.bounds.path.postures import Postures
 from guided_lgp.bounds.path.situation import Attach, Fingers, Release, Situation, Step
 from guided_lgp.bounds.path.spaces import wound
 from guided_lgp.bounds.path.task import Choice, Culprits, IkSolutions, Outcome, Stage, Task
@@ -163,14 +164,15 @@ class OutcomeSampler:
         at = situation.around(action.gripper, [(action.body, action.parent)])
         off = situation.around(action.gripper)
         attempts = np.zeros(len(solutions.cost), dtype=int)
-        for choice in solutions.order(contacts.cost)[:_CONFIGURATIONS]:
-            number, value, branch = choice
+        choices = solutions.order(contacts.cost)[:_CONFIGURATIONS]
+        postures = Postures(task.mover, at, off, solutions.chosen(choices))
+        for row, choice in enumerate(choices):
+            number, *_ = choice
             if attempts[number] >= _POSTURES:
                 continue
-            contact, before = solutions.q[number, :, None, value, branch]
-            if task.blocked(index, Stage.CONTACT, "at the contact", at, contact):
+            if task.met(index, Stage.CONTACT, "at the contact", postures.met_at(row)):
                 continue
-            if task.blocked(index, Stage.OFF, "before the contact", off, before):
+            if task.met(index, Stage.OFF, "before the contact", postures.met_off(row)):
                 continue
             if not contacts.possible(number):
                 continue

@@ -51,6 +51,12 @@ class JointSpace:
         """The first pair of bodies in collision along configurations (m, n) of the arm."""
         return self._checker.first_collision(self._whole(path), self._fingers)
 
+    def collisions(self, path: Array) -> list[tuple[str, str] | None]:
+        """The first pair in each of some configurations (m, n)."""
+        moving = self._checker.moving_joints(self._whole(path), self._fingers)
+        found = dict(self._checker.collisions(moving))
+        return [found.get(row) for row in range(len(path))]
+
     def distances(self, path: Array, count: int) -> tuple[Array, Array]:
         """The smallest distances (n, count) of bodies along a path (m, n), and gradients."""
         values, gradients = self._checker.distances(self._whole(path), self._fingers, count)

@@ -10,7 +10,7 @@ import numpy as np
 from guided_lgp.bounds.checks import closing_axis
 from guided_lgp.bounds.goals import GoalTerms
 from guided_lgp.bounds.path.grips import Grips
-from guided_lgp.bounds.path.motions import Motion, Mover, Surroundings, Tool, Transit
+from guided_lgp.bounds.path.motions import Motion, Mover, Pair, Surroundings, Tool, Transit
 from guided_lgp.bounds.path.situation import Situation, Step, situation_at_start, tool_pose
 from guided_lgp.bounds.path.steps import manoeuvre
 from guided_lgp.bounds.results import Array, Keyframe
@@ -103,6 +103,11 @@ class IkSolutions:
         number, value, branch = choice
         redundancy = float(self.redundancies[value])
         return Tool(self.rotation[number], self.contact[number], redundancy, branch)
+
+    def chosen(self, choices: Sequence[Choice]) -> Array:
+        """Configurations (m, 2, n) at the contact and off it."""
+        number, value, branch = np.array(choices, dtype=int).reshape(-1, 3).T
+        return self.q[number, :, value, branch]
 
     def order(self, extra: Array | float = 0.0) -> list[Choice]:
         """All configurations within reach, cheapest first; ``extra`` (N,) is added to the cost."""
@@ -343,7 +348,7 @@ class Task:
         self.culprits.anything = True
         self.record(index, stage, constraint)
 
-    def collided(self, index: int, stage: Stage, pair: tuple[str, str], where: str) -> None:
+    def collided(self, index: int, stage: Stage, pair: Pair, where: str) -> None:
         """Remember two bodies in collision."""
         self.culprits.symbols |= {self.mover.symbol_of(name) for name in pair}
         self.record(index, stage, f"{self.mover.name_of(pair)} {where}")
@@ -352,7 +357,10 @@ class Task:
         self, index: int, stage: Stage, where: str, surroundings: Surroundings, q: Array
     ) -> bool:
         """Whether configurations (m, n) of the moving arm collide, and remember it."""
-        pair = self.mover.collision(surroundings, q)
+        return self.met(index, stage, where, self.mover.collision(surroundings, q))
+
+    def met(self, index: int, stage: Stage, where: str, pair: Pair | None) -> bool:
+        """Whether two bodies collide, and remember it."""
         if pair is not None:
             self.collided(index, stage, pair, where)
         return pair is not None
