@@ -33,7 +33,7 @@ class Kinematics:
         self.model: Any = pinocchio.buildModelFromUrdf(str(urdf))
         self.data: Any = self.model.createData()
         self.names = tuple(joints)
-        self.joints = tuple(map(self._index, joints))
+        self.joints = tuple(joint_index(self.model, name) for name in joints)
         """Where the arms' joints stand, in the order of a configuration."""
 
     def rows(self, q: Array, fixed: Mapping[str, float]) -> Array:
@@ -47,7 +47,7 @@ class Kinematics:
 
         full = np.tile(pinocchio.neutral(self.model), (len(q), 1))
         for joint, value in fixed.items():
-            full[:, self._index(joint).position] = value
+            full[:, joint_index(self.model, joint).position] = value
         fill(full, self.joints, q)
         return full
 
@@ -73,9 +73,11 @@ class Kinematics:
                 poses[row, column] = pinocchio.SE3ToXYZQUAT(placement)
         return poses
 
-    def _index(self, name: str) -> JointIndex:
-        joint = self.model.joints[self.model.getJointId(name)]
-        return JointIndex(joint.idx_q, joint.idx_v, joint.nq == 2)
+
+def joint_index(model: Any, name: str) -> JointIndex:
+    """Where a joint stands in vectors of a model."""
+    joint = model.joints[model.getJointId(name)]
+    return JointIndex(joint.idx_q, joint.idx_v, joint.nq == 2)
 
 
 def fill(full: Array, indices: Sequence[JointIndex], angles: Array) -> None:

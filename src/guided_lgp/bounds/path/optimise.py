@@ -20,39 +20,33 @@ counts if its whole spline passes the collision checker.
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cache
 from itertools import groupby
-from typing import Any
 
-import casadi as ca
 import numpy as np
 
 from guided_lgp.bounds.path.motions import Motion, Mover, Transit
+from guided_lgp.bounds.path.quadratic import (
+    NEIGHBOURS,
+    WAYPOINTS,
+    QuadraticProgram,
+    quadratic_program,
+)
 from guided_lgp.bounds.path.situation import Step
 from guided_lgp.bounds.path.spaces import STEP
 from guided_lgp.bounds.path.spline import Cubic
-from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.bounds.results import Array
-from guided_lgp.robots import Arm, PlacedArm, Robot
+from guided_lgp.robots import Arm, PlacedArm
 
-WAYPOINTS = 10
-"""N, between the ends of a motion."""
-NEIGHBOURS = 4
-"""Pairs of bodies whose distance is constrained at a waypoint."""
 CLEARANCE = 0.012
 """Distance (m) of bodies at the waypoints."""
 ROUNDS = 5
 """Quadratic programs per motion, at most."""
 LEVEL = 0.01
 """How far (in sines) the vertical may turn in the tool frame on a level motion."""
-_TAU = 0.4
-"""Weight of smoothness against length (s): about the time in which a joint reaches full speed."""
 _TRUST = 0.3
 """Largest change (rad) of a joint in a round that linearises constraints."""
 _CONVERGED = 0.03
 """Change (rad) below which another round is not worth its time."""
-_SLACK_WEIGHT, _LEVEL_WEIGHT = 1e4, 1e4
-"""Weights of the squared slacks (1/m^2) and tilts, against seconds: 1 mm costs 0.01 s."""
 _SHORTEST = 0.05
 """Shortest motion (s at full speed) that is optimised."""
 _INSET, _NEAR_LIMIT = 0.02, 0.005
@@ -207,7 +201,7 @@ class _Spline:
 
 
 def _round(
-    program: Any,
+    program: QuadraticProgram,
     spline: _Spline,
     last: Array,
     near: tuple[Array, Array] | None,
@@ -249,61 +243,10 @@ def _round(
     rows = (*last * sign, before * sign, after * sign, (gradients * sign).ravel())
     bounds = np.sort(np.stack([low * sign, high * sign]), axis=0).reshape(2, -1)
     slack = np.full(WAYPOINTS, np.inf)
-    solution = program(
+    solution = program.solve(
         p=np.concatenate([*rows, upright, flags, [h]]),
         lbx=np.concatenate([bounds[0], -slack]),
         ubx=np.concatenate([bounds[1], slack]),
         lbg=least.ravel(),
     )
-    if not program.stats()["success"]:
-        return None
-    return np.asarray(solution["x"])[: inner.size, 0].reshape(inner.shape) * sign
-
-
-@cache
-def quadratic_program(robot: Robot, gripper: str) -> Any:
-    """The program of one round for an arm, or the mirror image of one, derived by CasADi."""
-    arm = robot.arms[gripper]
-    n = len(arm.joints)
-    q, slack = ca.SX.sym("q", n, WAYPOINTS), ca.SX.sym("slack", WAYPOINTS)
-    last = ca.SX.sym("last", n, WAYPOINTS + 2)
-    before, after = ca.SX.sym("before", n), ca.SX.sym("after", n)
-    gradients = ca.SX.sym("gradients", n, WAYPOINTS * NEIGHBOURS)
-    vertical = ca.SX.sym("vertical", 3)
-    leaves, enters, level, h = (ca.SX.sym(name) for name in ("leaves", "enters", "level", "h"))
-    points = ca.horzcat(last[:, 0], q, last[:, -1])
-    weights = ca.diag(ca.SX(_weights(arm)))
-    steps = weights @ (points[:, 1:] - points[:, :-1])
-    bends = steps[:, 1:] - steps[:, :-1]
-    first = steps[:, 0] - weights @ (last[:, 0] - before)
-    final = weights @ (after - last[:, -1]) - steps[:, -1]
-    smoothness = ca.sumsqr(bends) + leaves * ca.sumsqr(first) + enters * ca.sumsqr(final)
-    cost = ca.sumsqr(steps) / h + _TAU**2 * smoothness / h**3 + _SLACK_WEIGHT * ca.sumsqr(slack)
-    angles = ca.SX.sym("angles", n)
-    chain = kinematics_of(robot).arms[gripper].chain
-    up = chain.pose(angles, 1, (0,) * len(chain.fixed)).rotation[2, :].T
-    tilt = ca.Function("tilt", [angles], [up, ca.jacobian(up, angles)])
-    for i in range(WAYPOINTS):
-        now, change = tilt(last[:, i + 1])
-        turned = now + change @ (q[:, i] - last[:, i + 1]) - vertical
-        cost += _LEVEL_WEIGHT * level * ca.sumsqr(turned)
-    nearest = ca.vertcat(
-        *(
-            ca.dot(gradients[:, i * NEIGHBOURS + k], q[:, i]) + slack[i]
-            for i in range(WAYPOINTS)
-            for k in range(NEIGHBOURS)
-        )
-    )
-    numbers = ca.vertcat(
-        ca.vec(last),
-        before,
-        after,
-        ca.vec(gradients),
-        vertical,
-        leaves,
-        enters,
-        level,
-        h,
-    )
-    problem = {"x": ca.vertcat(ca.vec(q), slack), "f": cost, "g": nearest, "p": numbers}
-    return ca.qpsol("motion", "daqp", problem, {"error_on_fail": False})
+    return None if solution is None else solution[: inner.size].reshape(inner.shape) * sign

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from guided_lgp.bounds.results import Array, Attachment
 from guided_lgp.bounds.verify.attachments import carriers, spans
 from guided_lgp.logic import Skeleton
 from guided_lgp.poses import compose, inverse, rotation_matrix
+from guided_lgp.robots.kinematics import JointIndex, fill, joint_index
 from guided_lgp.scene import Scene
 from guided_lgp.scene.world import BOX_DENSITY, initial_poses
 
@@ -77,12 +78,10 @@ def own_weights(scene: Scene, q: Array) -> Array:
     """Torques (T, n) in Nm of the arms' own weight at configurations q (T, n)."""
     import pinocchio
 
-    kinematics = scene.robot.description.kinematics
-    model, data = _model(scene)
-    columns = [joint.velocity for joint in kinematics.joints]
-    full = kinematics.rows(q, scene.robot.fixed_values)
-    weights = [pinocchio.computeGeneralizedGravity(model, data, row)[columns] for row in full]
-    return np.array(weights)
+    arms = _arms(scene, weightless=False)
+    rows = arms.rows(q)
+    weights = [pinocchio.computeGeneralizedGravity(arms.model, arms.data, row) for row in rows]
+    return np.array(weights)[:, arms.columns]
 
 
 def derivatives(values: Array, times: Array) -> tuple[Array, Array]:
@@ -96,15 +95,12 @@ def _torques(scene: Scene, q: Array, rates: Array, changes: Array) -> Array:
     """Of the arms alone (R, n) at configurations (R, n), with their derivatives."""
     import pinocchio
 
-    robot = scene.robot.description
-    model, data = _model(scene)
-    columns = [joint.velocity for joint in robot.kinematics.joints]
-    velocities, accelerations = np.zeros((2, len(q), model.nv))
-    velocities[:, columns], accelerations[:, columns] = rates, changes
-    full = robot.kinematics.rows(q, scene.robot.fixed_values)
-    rows = zip(full, velocities, accelerations, strict=True)
-    torques = np.array([pinocchio.rnea(model, data, *row)[columns] for row in rows])
-    return np.asarray(torques - own_weights(scene, q) if robot.balanced else torques)
+    arms = _arms(scene, weightless=scene.robot.description.balanced)
+    velocities, accelerations = np.zeros((2, len(q), arms.model.nv))
+    velocities[:, arms.columns], accelerations[:, arms.columns] = rates, changes
+    rows = zip(arms.rows(q), velocities, accelerations, strict=True)
+    torques = [pinocchio.rnea(arms.model, arms.data, *row) for row in rows]
+    return np.array(torques)[:, arms.columns]
 
 
 def _load_torques(scene: Scene, q: Array, times: Array, load: Carried, rows: slice) -> Array:
@@ -118,27 +114,53 @@ def _load_torques(scene: Scene, q: Array, times: Array, load: Carried, rows: sli
     mass = BOX_DENSITY * volumes(scene)[load.span.box]
     pull = np.array([0.0, 0.0, GRAVITY])
     forces = mass * (changes + pull) @ rotation_matrix(scene.robot.base_pose[3:])
-    model, data = _model(scene)
-    columns = [joint.velocity for joint in robot.kinematics.joints]
-    frame = model.getFrameId(arm.tool_link)
+    arms = _arms(scene, weightless=False)
+    frame = arms.model.getFrameId(arm.tool_link)
     point = compose(arm.tool_in_link, load.grip)[:3]
     jacobians, turned = [], []
-    for configuration in robot.kinematics.rows(q[rows], scene.robot.fixed_values):
+    for row in arms.rows(q[rows]):
         jacobian = pinocchio.computeFrameJacobian(
-            model, data, configuration, frame, pinocchio.ReferenceFrame.LOCAL_WORLD_ALIGNED
+            arms.model, arms.data, row, frame, pinocchio.ReferenceFrame.LOCAL_WORLD_ALIGNED
         )
-        jacobians.append(jacobian[:, columns])
-        turned.append(data.oMf[frame].rotation @ point)
+        jacobians.append(jacobian)
+        turned.append(arms.data.oMf[frame].rotation @ point)
     wrenches = np.hstack([forces, np.cross(turned, forces)])
-    return np.asarray(np.einsum("rij,ri->rj", np.array(jacobians), wrenches))
+    torques = np.einsum("rij,ri->rj", np.array(jacobians), wrenches)
+    return np.asarray(torques[:, arms.columns])
 
 
-@lru_cache(maxsize=2)
-def _model(scene: Scene) -> tuple[Any, Any]:
-    """Pinocchio's model under the gravity of the mounted robot, and its data."""
+@dataclass(frozen=True)
+class _Arms:
+    """Pinocchio's model of a mounted robot whose arms' joints alone can move."""
+
+    model: Any
+    data: Any
+    joints: tuple[JointIndex, ...]
+
+    @cached_property
+    def columns(self) -> list[int]:
+        """Where the arms' joints are in a velocity of the model."""
+        return [joint.velocity for joint in self.joints]
+
+    def rows(self, q: Array) -> Array:
+        """Configurations (T, nq) of the model for (T, n)."""
+        full = np.empty((len(q), self.model.nq))
+        fill(full, self.joints, q)
+        return full
+
+
+@lru_cache(maxsize=4)
+def _arms(scene: Scene, weightless: bool) -> _Arms:
+    """The arms of a scene's robot, under gravity or without it."""
     import pinocchio
 
-    model = pinocchio.Model(scene.robot.description.kinematics.model)
-    down = np.array([0.0, 0.0, -GRAVITY]) @ rotation_matrix(scene.robot.base_pose[3:])
+    kinematics = scene.robot.description.kinematics
+    (home,) = kinematics.rows(scene.robot.start[None], scene.robot.fixed_values)
+    names = list(kinematics.model.names)
+    still = [number for number in range(1, len(names)) if names[number] not in kinematics.names]
+    model = pinocchio.buildReducedModel(kinematics.model, still, home)
+    down = np.array([0.0, 0.0, 0.0 if weightless else -GRAVITY])
+    down = down @ rotation_matrix(scene.robot.base_pose[3:])
     model.gravity = pinocchio.Motion(down, np.zeros(3))
-    return model, model.createData()
+    joints = tuple(joint_index(model, name) for name in kinematics.names)
+    return _Arms(model, model.createData(), joints)
