@@ -72,13 +72,13 @@ def _verdict(result: PlanningResult) -> str:
     return "stopped" if result.reason == "max_seconds" else "no plan"
 
 
-def judged(rows: Mapping[str, dict[str, Any]], folder: Path) -> list[dict[str, Any]]:
-    """The rows, with what the package says of the plans."""
-    answers = {name: f"{name}.npz" for name, row in rows.items() if row["verdict"] == "plan"}
-    write_json(folder / "answers.json", answers)
+def judged(name: str, row: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """The row of a task, with what the package says of its plan."""
+    if row["verdict"] != "plan":
+        return row | {"check": ""}
+    write_json(folder / "answers.json", {name: f"{name}.npz"})
     subprocess.run([str(PYTHON), str(PACKAGE), "judge", str(folder)], check=True)
-    verdicts = read_json(folder / "verdicts.json")
-    return [row | {"check": verdicts.get(name, {}).get("says", "")} for name, row in rows.items()]
+    return row | {"check": read_json(folder / "verdicts.json")[name]["says"]}
 
 
 def summary(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -115,15 +115,23 @@ def table(document: Mapping[str, Any]) -> str:
 
 
 def main(*names: str) -> None:
-    """Compute the rows of all tasks, or of those that are named; the others stay as they are."""
+    """Compute the rows of all tasks, or of those that are named; the others stay as they are.
+
+    Each row is written as soon as it is known: after a kill, name the tasks that are left.
+    """
+    found = {_key(row): row for row in _before()}
     with TemporaryDirectory() as name:
         folder = Path(name)
-        rows = {
-            task["name"]: answer(task, folder / f"{task['name']}.npz")
-            for task in tasks(folder, *names)
-        }
-        found = {_key(row): row for row in (*(_before() if names else ()), *judged(rows, folder))}
-    document = summary([found[key] for key in sorted(found)])
+        for task in tasks(folder, *names):
+            row = answer(task, folder / f"{task['name']}.npz")
+            found[_key(row)] = judged(task["name"], row, folder)
+            print(task["name"], row["verdict"], row["seconds"], flush=True)
+            write([found[key] for key in sorted(found)])
+
+
+def write(rows: Sequence[Mapping[str, Any]]) -> None:
+    """The document, and the table of the page."""
+    document = summary(rows)
     write_json(SOURCES / METRICS / FILE, document)
     before, begin, rest = (SOURCES / PAGE).read_text(encoding="utf-8").partition(BEGIN)
     _, end, after = rest.partition(END)
@@ -136,7 +144,9 @@ def _key(row: Mapping[str, Any]) -> tuple[int, int]:
 
 
 def _before() -> list[dict[str, Any]]:
-    found: list[dict[str, Any]] = read_json(SOURCES / METRICS / FILE)["rows"]
+    """What an earlier run has written."""
+    file = SOURCES / METRICS / FILE
+    found: list[dict[str, Any]] = read_json(file)["rows"] if file.is_file() else []
     return found
 
 

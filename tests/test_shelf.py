@@ -134,5 +134,5 @@ def test_a_row_comes_out_again(tmp_path: Path) -> None:
     name = "shelf_0_5"
     (known,) = (r for r in read_json(FILE)["rows"] if (r["demonstration"], r["base"]) == (0, 5))
     (one,) = shelf.tasks(tmp_path, name)
-    (row,) = shelf.judged({name: shelf.answer(one, tmp_path / f"{name}.npz")}, tmp_path)
+    row = shelf.judged(name, shelf.answer(one, tmp_path / f"{name}.npz"), tmp_path)
     assert {**row, "seconds": 0} == {**known, "seconds": 0}
