@@ -51,6 +51,11 @@ ELEVEN = [f"(on b{number} right)" for number in range(1, 12)]
         # A plate that juts out: fingers above and below it, where it is and where it goes.
         ("plate_at_edge", ["(on plate right)"], 2),
         ("plate_at_edge", ["(on plate post)"], 2),
+        # The same all around a lid, no deeper than it juts out over its pot.
+        ("lid_on_pot", ["(on lid right)"], 2),
+        ("lid_on_pot", ["(on lid post)"], 2),
+        # What a hand holds at the start may carry others.
+        ("stack_in_hand", ["(on cup right)"], 2),
         # The hand opens as far as the box asks, and goes between neighbours.
         ("sorting_10", [*RED, *GREEN], 20),
         # More actions than the paper's limit of depth.
@@ -112,17 +117,18 @@ def test_a_plate_with_nothing_free_below_is_too_wide() -> None:
     assert result.explanation.startswith("plate is too wide for the fingers: 0.200 m")
 
 
-def test_a_plate_in_a_hand_is_put_down_again() -> None:
-    scene = load_scene(CASES / "plate_at_edge.json")
-    taken = plan(scene, "(on plate right)")
+@pytest.mark.parametrize(("case", "body"), [("plate_at_edge", "plate"), ("lid_on_pot", "lid")])
+def test_what_is_held_flat_is_put_down_again(case: str, body: str) -> None:
+    scene = load_scene(CASES / f"{case}.json")
+    taken = plan(scene, f"(on {body} right)")
     assert taken.path is not None
     assert taken.path.trajectory is not None
     gripper, _ = taken.skeleton[0].symbols
     keyframe = taken.path.at_switch[0]
     tool = scene.robot.tool_pose(keyframe.q, gripper)
-    grasp = tuple(compose(inverse(tool), keyframe.boxes["plate"]).tolist())
-    held = scene.boxes[0].model_copy(update={"on": gripper, "grasp": grasp})
-    result = plan(scene.model_copy(update={"boxes": (held,)}), "(on plate right)", timeout=300)
+    grasp = tuple(compose(inverse(tool), keyframe.boxes[body]).tolist())
+    held = scene.boxes[-1].model_copy(update={"on": gripper, "grasp": grasp})
+    result = plan(scene.model_copy(update={"boxes": (held,)}), f"(on {body} right)", timeout=300)
     assert len(result.skeleton or ()) == 1, result.explanation
 
 

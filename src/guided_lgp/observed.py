@@ -11,7 +11,7 @@ from pydantic import Field, field_validator
 from guided_lgp.documents import read_json
 from guided_lgp.errors import InputError
 from guided_lgp.faults import Document, validated
-from guided_lgp.poses import Array, compose, inverse, quaternion, rotation_matrix
+from guided_lgp.poses import Array, compose, inverse, quaternion, rotation_matrix, yaw_of
 from guided_lgp.scene import Box, PlacedRobot, Scene, Table
 from guided_lgp.scene.footprints import footprint, inset
 
@@ -83,14 +83,16 @@ def observed_scene(scene: Scene, observed: Observed, where: str = "observed") ->
         if name not in observed.held
     ]
     boxes: dict[str, Box] = {}
-    for box in sorted(standing, key=lambda box: box.position[2]):
-        below = [*scene.supports, *boxes.values()]
-        boxes[box.name] = _put_down(box, below, f"{where}: boxes.{box.name}")
+    below: list[Table | Box] = [*scene.supports]
     for name, gripper in observed.held.items():
         tool = robot.tool_pose(robot.start, gripper)
         held = compose(inverse(tool), _pose(observed.boxes[name]))
         grasp = _centred(held, f"{where}: held.{name}")
         boxes[name] = known[name].model_copy(update={"on": gripper, "grasp": grasp})
+        below.append(_placed(known[name], compose(tool, np.array(grasp))))
+    for box in sorted(standing, key=lambda box: box.position[2]):
+        boxes[box.name] = _put_down(box, below, f"{where}: boxes.{box.name}")
+        below.append(boxes[box.name])
     changed = [boxes.get(box.name, box) for box in scene.boxes if box.fixed or box.name in boxes]
     document = scene.model_dump() | {
         "robot": robot.model_dump(),
@@ -129,6 +131,12 @@ def _centred(grasp: Array, where: str) -> tuple[float, ...]:
     sign = 1.0 if across == 0 else -1.0
     turned[:, 1 - across] = sign * np.cross(turned[:, 2], turned[:, across])
     return (grasp[0], 0.0, grasp[2], *quaternion(turned).tolist())
+
+
+def _placed(box: Box, where: Array) -> Box:
+    """The box at a level pose (7,)."""
+    x, y, z = where[:3].tolist()
+    return box.model_copy(update={"position": (x, y, z), "yaw": float(yaw_of(where))})
 
 
 def _level(box: Box, seen: ObservedBox, where: str) -> Box:

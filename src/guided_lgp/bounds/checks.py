@@ -138,11 +138,17 @@ def closing_axis(placement: Pose, tool: Pose) -> int:
 
 
 def turned_to_fingers(placement: Pose, tool: Pose) -> Pose:
-    """A pose of a cylinder, turned about its axis such that a hand's fingers close along its y."""
-    _, closing, _ = axes_of(tool)
-    x, y, _ = (dot(closing, axis) for axis in axes_of(placement))
-    turn = pose(np.zeros(3), math.atan2(-x, y))
-    turned: list[float] = compose(np.asarray(placement), turn).tolist()
+    """A pose of a cylinder, turned about its axis such that a hand's fingers close along its y.
+
+    Where they close on top and bottom: such that the hand comes along its x.
+    """
+    approach, closing, _ = axes_of(tool)
+    x, y, z = (dot(closing, axis) for axis in axes_of(placement))
+    turn = math.atan2(-x, y)
+    if abs(z) > math.sqrt(0.5):
+        x, y, _ = (dot(approach, axis) for axis in axes_of(placement))
+        turn = math.atan2(y, x)
+    turned: list[float] = compose(np.asarray(placement), pose(np.zeros(3), turn)).tolist()
     return turned
 
 

@@ -46,7 +46,15 @@ def is_held_flat(box: Box, bodies: Iterable[Body], widest: float) -> bool:
     if grasp_axes(box.size, widest) or box.size[2] > widest:
         return False
     below = next((body for body in bodies if body.name == box.on), None)
-    return below is None or inset(footprint(below), footprint(box)).min() < 0
+    return below is None or _juts_out(box, below)
+
+
+def _juts_out(box: Box, below: Body) -> bool:
+    """Whether the box around a body is not all above what it stands on."""
+    if below.convex.shape == "cylinder":
+        away = np.linalg.norm(footprint(box) - below.position[:2], axis=1)
+        return bool(away.max() > below.convex.half[0])
+    return bool(inset(footprint(below), footprint(box)).min() < 0)
 
 
 def grasp_at_start(box: Box, arm: Arm) -> tuple[float, ...]:

@@ -207,6 +207,12 @@ class Scene(Document):
         return {box.name: box.on for box in self.movable if box.on in hands}
 
     @property
+    def loaded(self) -> dict[str, str]:
+        """The gripper of each box that is in a hand at the start and carries others."""
+        below = {box.on for box in self.movable}
+        return {name: gripper for name, gripper in self.held.items() if name in below}
+
+    @property
     def supports(self) -> tuple[Table | Box, ...]:
         """What stays where it is and may be stood on: tables and fixed boxes."""
         return (*self.tables, *(box for box in self.boxes if box.fixed))
@@ -256,13 +262,10 @@ class Scene(Document):
             if name in parts:
                 raise ValueError(f"name {name!r} is that of a part of the robot")
             taken.add(name)
-        supports = {body.name for body in (*self.supports, *self.movable)} - self.held.keys()
+        supports = {body.name for body in (*self.supports, *self.movable)}
         for box in self.movable:
             if box.name in self.held:
                 continue
-            if box.on in self.held:
-                held = f"{box.on!r}, which {self.held[box.on]} holds"
-                raise ValueError(f"box {box.name!r} cannot stand on {held}, at the start")
             if box.on not in supports or box.on == box.name:
                 raise ValueError(f"box {box.name!r} stands on unknown table {box.on!r}")
             if "position" not in box.model_fields_set:

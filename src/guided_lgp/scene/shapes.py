@@ -73,13 +73,16 @@ class Convex:
         """Half extents (m) about the centre of what fingers may touch that close along an axis.
 
         Of a box, its sides; of a mesh, a rectangle inside both of two parallel faces, if there are
-        any; of a cylinder, the line that they touch. The component along the axis has no meaning.
+        any; of a cylinder, the line that they touch, or how far in from its middle they get at top
+        and bottom. The component along the axis has no meaning.
         """
         found = list(self.half)
         if self.shape == "mesh":
             first, second = _common_rectangle(self.vertices, self.half, axis)
         elif self.shape == "cylinder":
-            first, second = self.rest if axis == _UP else (min(_LINE, self.half[0]), self.half[2])
+            first, second = min(_LINE, self.half[0]), self.half[2]
+            if axis == _UP:
+                first = second = math.sqrt(self.half[0] ** 2 - first**2)
         else:
             return self.half
         found[_across(axis)[0]], found[_across(axis)[1]] = first, second

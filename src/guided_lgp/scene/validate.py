@@ -1,15 +1,17 @@
 """Checks of a scene that a user wrote by hand, before any planning."""
 
+import math
 from itertools import combinations, product
 
 import numpy as np
 
 from guided_lgp.errors import InputError
+from guided_lgp.poses import rotation_matrix, yaw_of
 from guided_lgp.scene.bodies import TABLE_THICKNESS, Box, Table
 from guided_lgp.scene.footprints import footprint, gap, inset, seat
 from guided_lgp.scene.model import Scene
-from guided_lgp.scene.tolerances import FLOAT, OVERLAP
-from guided_lgp.scene.world import initial_poses, poses_at_side, world_of
+from guided_lgp.scene.tolerances import FLOAT, LEVEL_ANGLE, OVERLAP
+from guided_lgp.scene.world import at_side, initial_poses, poses_at_side, world_of
 
 
 def validate_scene(scene: Scene, where: str = "scene") -> None:
@@ -28,6 +30,8 @@ def validate_scene(scene: Scene, where: str = "scene") -> None:
     _validate_tables(scene, where)
     _validate_robots_place(scene, where)
     fields = {box.name: f"{where}: boxes.{i} ({box.name})" for i, box in enumerate(scene.boxes)}
+    for name in scene.loaded:
+        _validate_level(scene, name, fields[name])
     standing = [box for box in scene.movable if box.name not in scene.held]
     for box in standing:
         _validate_height(scene, box, fields[box.name])
@@ -68,6 +72,14 @@ def _validate_robots_place(scene: Scene, where: str) -> None:
             raise InputError(f"{where}: {field}", fault)
 
 
+def _validate_level(scene: Scene, name: str, where: str) -> None:
+    """What carries others at the start is level in the hand there."""
+    tilt = math.acos(min(1.0, float(rotation_matrix(initial_poses(scene)[name][3:])[2, 2])))
+    if tilt > LEVEL_ANGLE:
+        fault = f"{scene.held[name]} holds it tilted by {tilt:.2f} rad, with boxes on it"
+        raise InputError(f"{where}.grasp", fault, f"at most {LEVEL_ANGLE} rad")
+
+
 def _validate_height(scene: Scene, box: Box, where: str) -> None:
     seen, below = [box.name], box.on
     supports = {other.name: other.on for other in scene.movable}
@@ -101,7 +113,11 @@ def _validate_balance(scene: Scene, box: Box, where: str) -> None:
 
 
 def _support(scene: Scene, box: Box) -> Table | Box:
-    return next(body for body in (*scene.supports, *scene.movable) if body.name == box.on)
+    body = next(body for body in (*scene.supports, *scene.movable) if body.name == box.on)
+    if body.name not in scene.held:
+        return body
+    held = initial_poses(scene)[body.name]
+    return body.model_copy(update={"position": tuple(held[:3]), "yaw": float(yaw_of(held))})
 
 
 def _validate_overlaps(scene: Scene, where: str) -> None:
@@ -111,7 +127,7 @@ def _validate_overlaps(scene: Scene, where: str) -> None:
     for box, gripper in scene.held.items():
         links = robot.description.arms[gripper].hand_links
         supports |= {frozenset((box, link)) for link in links}
-    sides = (robot.description.home, poses_at_side(scene), "boxes")
+    sides = (at_side(scene), poses_at_side(scene), "boxes")
     for q, boxes, field in (sides, (robot.start, initial_poses(scene), "robot.joints")):
         world.set(q, boxes)
         for overlap in world.penetrations(OVERLAP):

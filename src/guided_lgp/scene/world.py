@@ -339,7 +339,17 @@ def initial_poses(scene: Scene) -> dict[str, Array]:
 
 def poses_at_side(scene: Scene) -> dict[str, Array]:
     """Pose (7,) of every box when the arms have gone to their side, before the first action."""
-    return _poses(scene, scene.robot.description.home)
+    return _poses(scene, at_side(scene))
+
+
+def at_side(scene: Scene) -> Array:
+    """Configuration (n,) of arms at their side; one stays whose box carries others at the start."""
+    robot = scene.robot.description
+    q = robot.home.copy()
+    for gripper in scene.loaded.values():
+        arm = robot.arms[gripper].slice
+        q[arm] = scene.robot.start[arm]
+    return q
 
 
 def _poses(scene: Scene, q: Array) -> dict[str, Array]:

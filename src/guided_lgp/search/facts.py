@@ -281,7 +281,8 @@ class TaskFacts:
         """Grippers that hold a body, what has been done for that, and the state then."""
         holder = self._state.holder(body)
         if holder is not None:
-            yield holder, (), replace(self._state, held=((body, holder),))
+            held = sorted({*self._hands_empty.held, (body, holder)})
+            yield holder, (), replace(self._state, held=tuple(held))
         for taking in self._takings(body):
             yield taking.symbols[0], (taking,), successor(self._hands_empty, taking)
 
@@ -360,8 +361,9 @@ class TaskFacts:
 
     @cached_property
     def _hands_empty(self) -> State:
-        """The state at the start without what is in a hand."""
-        return replace(self._state, held=())
+        """The state at the start without what is in a hand, alone."""
+        loaded = self.scene.loaded.items()
+        return replace(self._state, held=tuple(h for h in self._state.held if h in loaded))
 
     def _alone(self, skeleton: tuple[Action, ...]) -> bool:
         body = self._symbols.domain.bind(skeleton[-1]).body

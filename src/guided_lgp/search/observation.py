@@ -7,12 +7,12 @@ import numpy as np
 from guided_lgp.bounds.results import Array, Keyframe
 from guided_lgp.poses import yaw_of
 from guided_lgp.scene import Scene
-from guided_lgp.scene.world import poses_at_side
+from guided_lgp.scene.world import at_side, poses_at_side
 
 
 def start(scene: Scene) -> Keyframe:
     """The configuration x_0: all arms at their side, boxes where the scene puts them."""
-    return Keyframe(scene.robot.description.home, poses_at_side(scene))
+    return Keyframe(at_side(scene), poses_at_side(scene))
 
 
 def observe(scene: Scene, keyframe: Keyframe) -> dict[str, Array]:

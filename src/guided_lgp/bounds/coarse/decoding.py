@@ -24,6 +24,7 @@ class Decoder:
         self._geometry = geometry
         self._robot = placed.description
         self._table = kernel_shapes(self._robot)
+        self._start = placed.start
         self._tools = {
             gripper: placed.tool_pose(self._robot.home, gripper) for gripper in self._robot.grippers
         }
@@ -48,7 +49,8 @@ class Decoder:
         for gripper, joints in slots.joints.items():
             if joints is not None:
                 arm = self._robot.arms[gripper]
-                q[arm.slice] = arm.signs * values[list(joints)]
+                stays = min(joints) < 0  # constants: it holds others out as it began
+                q[arm.slice] = self._start[arm.slice] if stays else arm.signs * values[list(joints)]
         return q
 
     def _box_pose(

@@ -61,8 +61,8 @@ class Facts:
         if hold not in self._known:
             limb = self._limbs[hold.gripper]
             sides = grasp_sides(self._geometry, hold.box, self._arms[hold.gripper].arm)
-            if self._turns_freely(hold.box):
-                sides = sides[:1]  # turned all around in the region
+            if self._turns_freely(hold.box):  # sides turned all around in the region
+                sides = tuple(side for side in sides if side.flat) or sides[:1]
             self._known[hold] = (
                 limb is not None
                 and bool(sides)
@@ -166,7 +166,13 @@ def _ranges(side: GraspSide, half_height: float, palm_front: float) -> tuple[Arr
         return np.array([0.0, -along, -up]), np.array([np.pi, along, up]), PALM_GAP
     pitch, offset, depth = side.given
     cp, sp = np.cos(pitch), np.sin(pitch)
-    behind = side.half_length * abs(cp) + half_height * sp + palm_front + depth
-    middle = np.array([pitch, -behind * cp - offset * sp, behind * sp - offset * cp])
+    deepest = side.half_length * abs(cp) + half_height * sp + palm_front + depth
+    behind = np.array([deepest, deepest + side.slack])
+    places = np.array([-behind * cp - offset * sp, behind * sp - offset * cp])
     off = np.array([GRASP_ANGLE, GRASP_OFFSET, GRASP_OFFSET])
-    return middle - off, middle + off, depth - GRASP_OFFSET
+    least, most = places.min(axis=1), places.max(axis=1)
+    return (
+        np.array([pitch, *least]) - off,
+        np.array([pitch, *most]) + off,
+        depth - GRASP_OFFSET,
+    )

@@ -11,7 +11,7 @@ import numpy as np
 
 from guided_lgp.bounds.coarse.parts import Boxes, stacked_with
 from guided_lgp.bounds.results import CoarseResult, Failure
-from guided_lgp.logic import Action, Skeleton
+from guided_lgp.logic import Action, Skeleton, successor
 from guided_lgp.scene import Scene
 from guided_lgp.scene.footprints import footprint, gap
 
@@ -71,7 +71,7 @@ class Pairs:
     def impossible(self, skeleton: Skeleton) -> Failure | None:
         """What makes the last action of a sequence impossible, as far as facts of pairs go."""
         *before, last = skeleton
-        moved = {self._bind(action).body for action in before}
+        moved = self._moved(tuple(before))
         if self._bind(last).body in moved or not self._bind(last).into_hand:
             return None
         for boxes in self.blockers(last):
@@ -79,6 +79,15 @@ class Pairs:
                 fault = " ".join((str(last)[1:-1], *sorted(boxes)))
                 return Failure(len(before), fault, np.nan, _PROVED)
         return None
+
+    def _moved(self, skeleton: Skeleton) -> set[str]:
+        """What actions move, directly or with what it stands on."""
+        moved, state = set[str](), self._scene.state
+        for action in skeleton:
+            body = self._bind(action).body
+            moved |= {body, *state.carried_by(body)}
+            state = successor(state, action)
+        return moved
 
 
 _PROVED = "infeasible in the scene of these boxes alone"

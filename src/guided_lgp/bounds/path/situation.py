@@ -120,7 +120,10 @@ def situation_at_start(scene: Scene, upright: frozenset[str] = frozenset()) -> S
             width = box.size[closing_axis(grasp.tolist(), IDENTITY.tolist())]
             fingers[gripper] = robot.arms[gripper].fingers.value(width)
             carried[box.name] = gripper, grasp
-            del standing[box.name]
+            below = inverse(standing.pop(box.name))
+            for rider in scene.state.carried_by(box.name):
+                on_it = compose(below, standing.pop(rider))
+                carried[rider] = gripper, compose(grasp, on_it)
     return Situation(scene.state, scene.robot.start, fingers, standing, carried, upright)
 
 

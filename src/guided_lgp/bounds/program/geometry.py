@@ -14,6 +14,7 @@ from guided_lgp.scene.footprints import gap
 from guided_lgp.scene.grasps import ROUND_TURNS, grasp_axes
 from guided_lgp.scene.model import Column
 from guided_lgp.scene.shapes import Convex, Vector
+from guided_lgp.scene.world import initial_poses
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,9 @@ class GraspSide:
     """Pitch, offset and depth of the one grasp on it, where these are not variables."""
     flat: bool = False
     """Whether it is top and bottom: the hand comes level, a quarter turn about its approach from
-    where its fingers would close on the upright sides along that length."""
+    where its fingers would close on the upright sides along that length ..."""
+    slack: float = 0.0
+    """... and may be so much less deep than given (m)."""
 
 
 class SceneGeometry:
@@ -78,6 +81,10 @@ class SceneGeometry:
         """What stays where it is and may be stood on."""
         self.boxes = tuple(map(self._add, scene.movable))
         """What may be moved."""
+        for name in scene.loaded:
+            x, y, z = initial_poses(scene)[name][:3]
+            yaw = float(yaw_of(initial_poses(scene)[name]))
+            self.poses[name] = (*self.in_robot(x, y, yaw), z + float(self._shift[2]))
         columns = map(self._add, _lower_parts(scene.robot.columns))
         self.obstacles = (*columns, *map(self._add, scene.obstacles))
         self.overhung = frozenset(filter(self._is_overhung, self.supports))

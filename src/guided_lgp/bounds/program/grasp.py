@@ -64,27 +64,35 @@ def _free_sides(geometry: SceneGeometry, box: str, arm: Arm) -> tuple[GraspSide,
 
 
 def _flat_sides(half: tuple[float, float, float], arm: Arm) -> Iterator[GraspSide]:
-    """Top and bottom, for a hand that comes from each end, deep or half as deep, either way up."""
+    """Top and bottom, for a hand that comes from each end, either way up."""
     hx, hy, hz = half
-    for quarter, pitch, share in product(range(4), (0.0, np.pi), (1.0, 0.5)):
+    for quarter, pitch in product(range(4), (0.0, np.pi)):
         length = hy if quarter % 2 else hx
         fingers = -arm.palm_front - INSET
         deepest = max(PALM_GAP, fingers + 2 * (INSET - length))
-        depth = share * deepest + (1 - share) * fingers
-        given = (pitch, 0.0, depth)
-        yield GraspSide(quarter * np.pi / 2, length, 2 * hz, (length, hz), given, flat=True)
+        yield GraspSide(
+            quarter * np.pi / 2,
+            length,
+            2 * hz,
+            (length, hz),
+            given=(pitch, 0.0, deepest),
+            flat=True,
+            slack=fingers - deepest,
+        )
 
 
 def sides_of(geometry: SceneGeometry, box: str, arm: Arm, grasp: Array) -> tuple[GraspSide, ...]:
     """The sides on which a grasp may close, a pose (7,) of the box in the tool frame.
 
-    Of a cylinder that is the one that the fingers are at.
+    Of a cylinder that is the one that the fingers are at; of its top and bottom, the one from which
+    the hand comes.
     """
-    if not geometry.is_round(box):
-        return _free_sides(geometry, box, arm)
-    sides = geometry.grasp_sides(box, arm.fingers.grasp_width)
-    x, y, _ = rotation_matrix(inverse(grasp)[3:])[:, 1]
-    return tuple(replace(side, turn=float(np.arctan2(-x, y))) for side in sides[:1])
+    sides = _free_sides(geometry, box, arm)
+    if not geometry.is_round(box) or not sides:
+        return sides
+    approach, closing, _ = rotation_matrix(inverse(grasp)[3:]).T
+    x, y = (-approach[1], approach[0]) if sides[0].flat else closing[:2]
+    return (replace(sides[0], turn=float(np.arctan2(-x, y))),)
 
 
 def tool_target(pose: Any, height: Any, grip: Any, p: Any, palm_front: float) -> tuple[Any, Any]:

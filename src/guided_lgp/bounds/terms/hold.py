@@ -6,6 +6,7 @@ configuration, and of the far end of each straight way to it or from it.
 """
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
@@ -145,16 +146,29 @@ def take_over(context: Context, gripper: str, box: str) -> None:
     if found is None:
         accepted = "fingers across upright sides, the body level when the hand points down or ahead"
         raise InputError(f"{box}.grasp", f"{gripper} does not hold the body so", accepted)
-    held = _given_grip(context, gripper, box, *found)
+    side, given = found
+    held = _given_grip(context, gripper, box, replace(side, slack=0.0), given)
     context.hands[gripper] = context.held[box] = held
     context.grips.append(held)
     context.configurations[held] = ()  # until an action adds one
+    if context.state.standing_on(box):
+        context.standing[gripper] = _at_start(context, held)
+
+
+def _at_start(context: Context, held: HeldBox) -> ArmConfiguration:
+    """The arm that holds out its box at the start, with others on it."""
+    arm = context.robot.arms[held.gripper].arm
+    values = arm.signs * context.geometry.scene.robot.start[arm.slice]
+    joints = tuple(context.program.constant(value) for value in values.tolist())
+    return ArmConfiguration(held, context.action, joints, context.pose[held.box])
 
 
 def _given_grip(context: Context, gripper: str, box: str, side: GraspSide, given: Grip) -> HeldBox:
-    """A grasp that leaves nothing to choose."""
+    """A grasp that leaves nothing to choose, or on top and bottom its depth alone."""
     fingers = context.robot.arms[gripper].arm.fingers
-    pitch, offset, depth = (context.program.variable(v, v, 1e-3, v) for v in given)
+    pitch, offset = (context.program.variable(v, v, 1e-3, v) for v in given[:2])
+    deepest, weight = given[2], 0.05 if side.slack else 1e-3
+    depth = context.program.variable(deepest, deepest + side.slack, weight, deepest)
     closed = (fingers.widest - fingers.opening_for(side.width)) / 2
     return HeldBox(gripper, box, pitch, offset, depth, side, context.half(box)[2], closed, given)
 

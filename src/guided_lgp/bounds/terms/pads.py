@@ -1,5 +1,6 @@
 """``pads(gripper, box)``: the fingertips lie on the side of the box that they close on."""
 
+import math
 from collections.abc import Iterator
 
 import casadi as ca
@@ -14,6 +15,7 @@ from guided_lgp.bounds.terms.term import Term
 from guided_lgp.logic.declarations import Instruction, Variable
 from guided_lgp.scene.shapes import Convex
 
+_UP = 2
 TOLERANCE = 0.001
 """By how much (m) a grasp that is looked at may be off that rule."""
 
@@ -63,6 +65,9 @@ def check(body: Convex, placement: Pose, tool: Pose) -> float:
     axes, offset = axes_of(placement), offset_of(tool, placement)
     across = closing_axis(placement, tool)
     touched, along = body.side(across), (axis for axis in range(3) if axis != across)
+    if body.shape == "cylinder" and across == _UP:
+        away = math.hypot(*(dot(offset, axes[axis]) for axis in along))
+        return away - body.half[0] + INSET - TOLERANCE
     outside = (abs(dot(offset, axes[axis])) - touched[axis] for axis in along)
     return max(outside) + INSET - TOLERANCE
 

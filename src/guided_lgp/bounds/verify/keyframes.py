@@ -21,7 +21,7 @@ from guided_lgp.bounds.terms.carried import relative
 from guided_lgp.bounds.verify.geometry import declared, grasp_faults, placement_faults
 from guided_lgp.logic import Action, Skeleton, State, successor
 from guided_lgp.robots import Fingers, Robot
-from guided_lgp.scene.world import World, poses_at_side
+from guided_lgp.scene.world import World, at_side, poses_at_side
 
 LIMIT_TOLERANCE = 1e-6
 
@@ -96,7 +96,7 @@ def verify_keyframes(
         The first violation with its action, or None.
     """
     state = world.scene.state
-    start = Keyframe(world.scene.robot.description.home, poses_at_side(world.scene))
+    start = Keyframe(at_side(world.scene), poses_at_side(world.scene))
     for action in skeleton[:verified]:
         state = successor(state, action)
     first = after_action[verified - 1] if verified else start
