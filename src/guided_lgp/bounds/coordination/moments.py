@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from guided_lgp.bounds.collision import PlanningScene, checker_of
 from guided_lgp.bounds.coordination.itinerary import Itinerary
-from guided_lgp.bounds.coordination.roads import BETWEEN, Edge, Node, Road
+from guided_lgp.bounds.coordination.roads import Edge, Node, Road
 from guided_lgp.bounds.results import Array
 from guided_lgp.scene import Scene
 
-_COARSE = 6
+_COARSE = 12
 """Every so-many-th moment is looked at first: what collides is found soon."""
 
 Position = tuple[Edge | Node, int]
@@ -67,26 +67,23 @@ class Moments:
         if not some:
             return True
         self._checker.enter(self._scene(moments[0]))
-        free = self._checker.free(self._rows(moments[0], np.array(some))).reshape(len(some), -1)
-        clear = [bool(rows.all()) for rows in free]
-        self._clear |= zip((moments[tick] for tick in some), clear, strict=True)
-        return all(clear)
+        clear = self._checker.free(self._rows(moments[0], np.array(some)))
+        self._clear |= zip((moments[tick] for tick in some), clear.tolist(), strict=True)
+        return bool(clear.all())
 
     def _rows(self, moment: Moment, ticks: NDArray[np.int_]) -> Array:
-        """All moving joints (m, joints), some ticks after a moment, on the way from the tick before
-        each.
-        """
-        rows = np.empty((len(ticks), BETWEEN, len(self._robot.moving_joints)))
+        """All moving joints (m, joints), some ticks (m,) after a moment."""
+        rows = np.empty((len(ticks), len(self._robot.moving_joints)))
         arms = self._robot.arms.values()
         for arm, road, (where, row) in zip(arms, self._roads, moment, strict=True):
             if isinstance(where, Node):
                 q, fingers = road.rest(where)
                 values = fingers * arm.fingers.ratios
             else:
-                q, values = where.fine[row - 1 + ticks], where.fine_fingers[row - 1 + ticks]
-                values = values[..., None] * arm.fingers.ratios
-            rows[..., arm.slice], rows[..., arm.fingers.slice] = q, values
-        return rows.reshape(-1, rows.shape[-1])
+                q, values = where.q[row + ticks], where.fingers[row + ticks, None]
+                values = values * arm.fingers.ratios
+            rows[:, arm.slice], rows[:, arm.fingers.slice] = q, values
+        return rows
 
     def _scene(self, moment: Moment) -> PlanningScene:
         """What is where, and what may touch."""

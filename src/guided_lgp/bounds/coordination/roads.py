@@ -9,7 +9,6 @@ leaves before they are wide open.
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -27,8 +26,6 @@ _PATIENCE = 8
 """How often a motion is made slower until the fingers have time to move."""
 _SLOWER = 1.15
 """By what factor each time."""
-BETWEEN = 2
-"""Configurations that are checked for each row, on the way from the one before."""
 _OFF = 0.004
 """Distance (m) of either finger from the body between them at which the hand may move; planning
 keeps 3 mm from everything."""
@@ -77,16 +74,6 @@ class Edge:
     def ticks(self) -> int:
         """How long it takes."""
         return len(self.q) - 1
-
-    @cached_property
-    def fine(self) -> Array:
-        """Configurations (ticks, BETWEEN, n) on the way to every row but the first."""
-        return _between_rows(self.q)
-
-    @cached_property
-    def fine_fingers(self) -> Array:
-        """Values (ticks, BETWEEN) of the fingers there."""
-        return _between_rows(self.fingers)
 
 
 class Road:
@@ -272,12 +259,6 @@ def _joined(*parts: tuple[int, Array]) -> Array:
     for row, part in parts:
         values[row : row + len(part)], values[row + len(part) :] = part, part[-1]
     return values
-
-
-def _between_rows(values: Array) -> Array:
-    """Values (T - 1, BETWEEN, ...) from each of (T, ...) to the next one."""
-    parts = np.arange(1, BETWEEN + 1) / BETWEEN
-    return np.stack([values[:-1] + part * np.diff(values, axis=0) for part in parts], axis=1)
 
 
 def _lengths(q: Array, arm: Arm) -> Array:

@@ -12,7 +12,7 @@ from itertools import count, product
 from guided_lgp.bounds.coordination.moments import Moment, Moments, Position, later
 from guided_lgp.bounds.coordination.roads import Edge, Node, Road
 
-_WAIT = 5
+_WAIT = 10
 """Ticks after which an arm that waits looks again."""
 _HASTE, _CARE = (5.0, 1500), (2.0, 250)
 """Weights of the estimate, and states that are expanded with it at most: the heavier, the sooner a

@@ -64,7 +64,9 @@ class Gap:
     def direct(self) -> Way | None:
         """Straight on, or None if nothing has been found."""
         if not self._motions:
-            return _way(self._way_out, (), self._way_in)
+            pieces = tuple(path for path in (self._way_out, self._way_in) if len(path) > 1)
+            still = self._way_out[[0, 0]]
+            return Way(pieces or (still,), _straight(self._way_out), _straight(self._way_in))
         return self._joined(self._motions)
 
     @cached_property
@@ -101,43 +103,40 @@ class Gap:
         return way
 
     def _joined(self, motions: Sequence[Motion]) -> Way | None:
-        """Some motions in one, and with the straight ways before and after, if possible."""
+        """Some motions in one, and with the straight ways before and after, if possible.
+
+        These are as short as can be, or where no motion is free then, as the path bound has them.
+        """
         leaves, arrives = motions[0] is self._motions[0], motions[-1] is self._motions[-1]
-        side = self._arm.arm.home + self._turn
-        out = self._shortened(self._way_out, motions[0]) if leaves else side[None]
-        into = self.into if arrives else side[None]
-        found = [path + self._turn for path in (motion.path for motion in motions)]
-        if leaves:
-            found.insert(0, self._way_out[len(out) - 1 :])
-        if arrives:
-            found.append(self._way_in[: len(self._way_in) - len(into) + 1])
+        side = (self._arm.arm.home + self._turn)[None]
+        longest = self._way_out if leaves else side, self._way_in if arrives else side
+        out = self._shortened(self._way_out, motions[0]) if leaves else side
+        into = self.into if arrives else side
+        found = [motion.path + self._turn for motion in motions]
         transit = motions[-1].transit
         assert transit is not None
-        path = self._free(transit, out, found, into)
-        if path is not None:
-            whole = np.concatenate([out, path[1:], into[1:]])
-            return Way((whole,), _straight(out), _straight(into))
-        return None if self._wound and arrives else _way(out, found, into)
+        for lines in ((out, into), longest):
+            before, after = (longest[0][len(lines[0]) - 1 :], longest[1][::-1][len(lines[1]) - 1 :])
+            detour = np.concatenate([before, *found, after[::-1]])
+            path = self._free(transit, lines, detour)
+            if path is not None:
+                whole = np.concatenate([lines[0], path[1:], lines[1][1:]])
+                return Way((whole,), _straight(out), _straight(into))
+        if self._wound and arrives:
+            return None
+        pieces = tuple(path for path in (longest[0], *found, longest[1]) if len(path) > 1)
+        return Way(pieces, _straight(out), _straight(into))
 
-    def _free(
-        self, transit: Transit, out: Array, found: Sequence[Array], into: Array
-    ) -> Array | None:
+    def _free(self, transit: Transit, lines: tuple[Array, Array], detour: Array) -> Array | None:
         """The best free path (m, n) between two straight ways, begun from the line between them or
-        from what has been found.
+        from a detour.
         """
-        lines = (out if len(out) > 1 else None), (into if len(into) > 1 else None)
-        detour = np.concatenate([out[-1:], *found, into[:1]])
-        guesses = [] if transit.keep_level else [np.linspace(out[-1], into[0], _GUESS)]
+        guesses = [] if transit.keep_level else [np.linspace(detour[0], detour[-1], _GUESS)]
         if not self._wound:
             guesses.append(detour)
-        paths = (optimal_path(self._mover, transit, guess, *lines) for guess in guesses)
+        beside = [line if len(line) > 1 else None for line in lines]
+        paths = (optimal_path(self._mover, transit, guess, *beside) for guess in guesses)
         return next((path for path in paths if path is not None), None)
-
-
-def _way(out: Array, free: Sequence[Array], into: Array) -> Way:
-    """A rest after every path."""
-    pieces = tuple(path for path in (out, *free, into) if len(path) > 1)
-    return Way(pieces or (out[[0, 0]],), _straight(out), _straight(into))
 
 
 def _straight(way: Array) -> int:
