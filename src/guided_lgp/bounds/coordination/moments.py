@@ -1,6 +1,7 @@
 """Whether all arms, each somewhere on its way, are clear of each other and of every body."""
 
 from collections.abc import Mapping, Sequence
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,8 @@ from guided_lgp.scene import Scene
 
 _COARSE = 12
 """Every so-many-th moment is looked at first: what collides is found soon."""
+_BESIDE = 4
+"""Ticks around a collision that verification has found between moments that are clear."""
 
 Position = tuple[Edge | Node, int]
 """A row of a motion, or a place where an arm rests."""
@@ -52,8 +55,13 @@ class Moments:
         return self._judge(moments, first) and self._judge(moments, rest)
 
     def block(self, moment: Moment) -> None:
-        """Never come to a moment again."""
-        self._clear[moment] = False
+        """Never come near a moment again: what collides there passes the rows beside it, too."""
+        near = range(-_BESIDE, _BESIDE + 1)
+        beside = [
+            [at] if isinstance(at[0], Node) else [later(at, ticks) for ticks in near]
+            for at in moment
+        ]
+        self._clear |= dict.fromkeys(product(*beside), False)
 
     def over(self, moment: Moment) -> list[int]:
         """The last stop of every arm that is over."""
