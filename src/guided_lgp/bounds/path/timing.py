@@ -24,8 +24,9 @@ from guided_lgp.bounds.results import Array
 from guided_lgp.compiled import address, load_compiled
 from guided_lgp.robots import Arm
 
-INTERVAL = 0.05
-"""Longest time (s) between two rows of a trajectory."""
+INTERVAL = 0.04
+"""Longest time (s) between two rows of a trajectory: a controller's curve through them then stays
+within a millimetre of the straight lines between them."""
 _SHARE = 0.97
 """Share of the limits that is used, so that the rounded rows keep them too."""
 _GRID_STEP = 0.04
