@@ -138,11 +138,13 @@ def coarse_bound(pair: Pair, count: int) -> dict[str, Any]:
     """Verdicts of the coarse bound whose prefix is feasible.
 
     Those that the enumeration of setup a asks for, and in the setup of the largest searches those
-    along random walks that end at the first infeasible one.
+    along random walks that end at the first infeasible one. What no fact explains is so rare there
+    that it is looked for elsewhere, too; both versions give it the same number of starts.
     """
     verdicts = [*_enumerated(pair, max(1, count // 10)), *_walks(pair, "e10", max(1, count // 2))]
     same = {feasible: [v for v in verdicts if _both(v, feasible)] for feasible in (True, False)}
-    unexplained = [v for v in same[False] if v["new"]["starts"]]
+    others = [v for v in _crowds(pair, "e6", max(1, count // 5)) if _both(v, False)]
+    unexplained = [v for v in (*same[False], *others) if _starts(v, "old") == _starts(v, "new") > 0]
     return {
         "feasible": summary(same[True]),
         "infeasible": summary(same[False]),
@@ -189,6 +191,29 @@ def _walks(pair: Pair, setup: str, count: int) -> Iterator[dict[str, Any]]:
             yield verdict
             if not _both(verdict, True):
                 break
+
+
+def _crowds(pair: Pair, setup: str, count: int) -> Iterator[dict[str, Any]]:
+    """Verdicts of both versions on putting box after box on one until that fails, by version.
+
+    Facts are about arms and about what stands where it was at the start: not about this.
+    """
+    rng = np.random.default_rng([SEED, 4])
+    for number, scene in enumerate(generate(setup, SCENES, SEED, "bench").scenes[:count]):
+        base, *others = (box.name for box in scene.boxes)
+        words: list[str] = []
+        for box in others:
+            hand = rng.choice(scene.symbols.grippers)
+            grasp, place = f"(grasp {hand} {box})", f"(place {hand} {box} {base})"
+            if _both(pair.ask("coarse", setup, number, [*words, grasp]), True):
+                verdict = _verdict(pair, setup, number, words := [*words, grasp, place])
+                yield verdict
+                if not _both(verdict, True):
+                    break
+
+
+def _starts(verdict: dict[str, Any], version: str) -> int:
+    return int(verdict[version]["starts"])
 
 
 def _random(pair: Pair, setup: str, number: int, words: list[str], rng: np.random.Generator) -> str:
