@@ -88,9 +88,13 @@ def load_generated(name: str, key: str, generate: Callable[[], str]) -> ctypes.C
 def address(array: NDArray[Any] | None) -> ctypes.c_void_p:
     """Where a contiguous array begins; null for none.
 
-    By numpy's interface, which is several times faster than by ``array.ctypes``.
+    By the buffer of what may be written, which is five times faster than by ``array.ctypes``.
     """
-    return ctypes.c_void_p(None if array is None else array.__array_interface__["data"][0])
+    if array is None or not array.size:
+        return ctypes.c_void_p(None)
+    if array.flags.writeable:
+        return ctypes.c_void_p(ctypes.addressof(ctypes.c_char.from_buffer(array)))  # type: ignore[arg-type]
+    return ctypes.c_void_p(array.ctypes.data)
 
 
 def _compilers() -> Iterator[list[str]]:

@@ -45,12 +45,21 @@ def compose(first: Array, second: Array) -> Array:
     library = _library()
     if library is not None:
         shape = np.broadcast_shapes(first.shape, second.shape)
-        pair = (np.broadcast_to(transform, shape) for transform in (first, second))
-        arrays = [*(np.ascontiguousarray(array, dtype=float) for array in pair), np.empty(shape)]
-        library.compose(arrays[2].size // 7, *map(address, arrays))
-        return arrays[2]
+        found = np.empty(shape)
+        pair = _spread(first, shape), _spread(second, shape)
+        library.compose(found.size // 7, *map(address, pair), address(found))
+        return found
     position = first[..., :3] + rotate(first[..., 3:], second[..., :3])
     return np.concatenate([position, multiply(first[..., 3:], second[..., 3:])], axis=-1)
+
+
+def _spread(transform: Array, shape: tuple[int, ...]) -> Array:
+    """A contiguous array of a shape; ``numpy.broadcast_to`` takes longer than the composition."""
+    if transform.shape == shape:
+        return np.ascontiguousarray(transform, dtype=float)
+    spread = np.empty(shape)
+    spread[...] = transform
+    return spread
 
 
 def _compose_two(first: list[float], second: list[float]) -> tuple[float, ...]:

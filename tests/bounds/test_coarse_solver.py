@@ -14,7 +14,7 @@ from guided_lgp.bounds.coarse.formulation import Formulator
 from guided_lgp.bounds.coarse.solver import Compiled, Interpreter, Settings
 from guided_lgp.bounds.coarse.starts import Starts
 from guided_lgp.bounds.program.geometry import Margins, SceneGeometry
-from guided_lgp.bounds.program.inverse import INPUTS
+from guided_lgp.bounds.program.inverse import INPUTS, Grid
 from guided_lgp.bounds.program.kernels import Kernel
 from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.bounds.terms import kernel_table
@@ -90,10 +90,11 @@ def test_compiled_and_interpreted_loops_agree(skeleton: str) -> None:
     assert one.steps == other.steps
     assert one.violation == pytest.approx(other.violation, abs=1e-7)
     assert one.values == pytest.approx(other.values, abs=1e-6)
-    arguments = rng.uniform(-0.5, 0.5, (20, INPUTS))
-    assert fast.closed_form("0", arguments) == pytest.approx(
-        slow.closed_form("0", arguments), abs=1e-9
-    )
+    sizes = {"candidates": (20, INPUTS), "grasp": 5, "poses": (3, 4), "pitches": 2, "ends": (3, 2)}
+    grid = Grid(**{name: rng.uniform(-0.5, 0.5, size) for name, size in sizes.items()})
+    for mine, its in zip(fast.holds("0", grid), slow.holds("0", grid), strict=True):
+        assert mine == pytest.approx(its, abs=1e-9)
+    assert np.array_equal(fast.least_costs("0", grid), fast.holds("0", grid)[1].min(axis=2))
 
 
 def test_variables_stay_within_their_bounds() -> None:

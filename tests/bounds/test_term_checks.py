@@ -59,7 +59,7 @@ def test_hold(gripper: str) -> None:
     rng, verdicts = np.random.default_rng(0), []
     arm = kinematics_of(ROBOT).arms[gripper]
     widest = arm.arm.fingers.grasp_width
-    ik = start_ik(kinematics_of(ROBOT), FIXED, default_solver(ROBOT).closed_form)[gripper]
+    ik = start_ik(kinematics_of(ROBOT), FIXED, default_solver(ROBOT))[gripper]
     for _ in range(80):
         place = np.array([0.55, 0.2 * arm.side, rng.uniform(-1.5, 1.5), rng.uniform(0.5, 0.8)])
         pitch, offset = rng.uniform(0.4, 2.7), rng.uniform(-0.04, 0.04)
@@ -67,7 +67,7 @@ def test_hold(gripper: str) -> None:
         joints, missing = ik(
             held(gripper), (offset, depth), place[None], np.array([pitch]), np.zeros((1, 2))
         )
-        q = joints[0, 0, 0, np.argmin(missing[0, 0, 0])].copy()
+        q = joints[0, 0, 0, np.argmin(missing[0, 0])].copy()
         q[rng.integers(7)] += rng.choice([0.0, 0.2])
         grasp = (HALF_LENGTH, HALF_HEIGHT, 0.0, 0.0)
         x = np.array([*q, pitch, offset, depth, *place])

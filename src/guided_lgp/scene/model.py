@@ -129,8 +129,10 @@ class PlacedRobot(BaseModel):
         wanted = tuple(arms) if grippers is None else grippers
         poses = self.link_poses(q, [arms[gripper].tool_link for gripper in wanted])
         return {
-            gripper: compose(poses[:, column], arms[gripper].tool_in_link)
-            for column, gripper in enumerate(wanted)
+            gripper: links
+            if arms[gripper].tool_is_link
+            else compose(links, arms[gripper].tool_in_link)
+            for gripper, links in zip(wanted, np.moveaxis(poses, 1, 0), strict=True)
         }
 
     @model_validator(mode="before")

@@ -144,22 +144,14 @@ class World:
                 self.boxes[name], placement[:3], placement[3:], physicsClientId=self.client
             )
 
-    def set_fingers(self, fingers: Mapping[str, float]) -> None:
-        """Put fingers to a value (rad or m), by gripper, without moving anything else."""
-        for gripper, value in fingers.items():
-            joints = self._description.arms[gripper].fingers
-            pybullet.resetJointStatesMultiDof(
-                self.robot,
-                [self.joints[joint] for joint in joints.joints],
-                [[ratio * value] for ratio in joints.ratios.tolist()],
-                physicsClientId=self.client,
-            )
-
-    def penetrations(self, margin: float = MARGIN) -> list[Penetration]:
+    def penetrations(
+        self, margin: float = MARGIN, touching: Iterable[tuple[str, str]] = ()
+    ) -> list[Penetration]:
         """Pairs of bodies that overlap by more than ``margin`` (m), deepest first.
 
         Every contact the collision detection reports is measured again from scratch, as its
-        cached contact points depend on what was asked before.
+        cached contact points depend on what was asked before. Pairs that are said to be
+        ``touching`` are left out.
         """
         pybullet.performCollisionDetection(physicsClientId=self.client)
         suspects = {
@@ -167,6 +159,8 @@ class World:
             for contact in pybullet.getContactPoints(physicsClientId=self.client)
             if contact[8] < 0
         }
+        pairs = [(self._parts[one], self._parts[other]) for one, other in touching]
+        suspects.difference_update(pairs, [pair[::-1] for pair in pairs])
         found = []
         for first, second in suspects:
             depth = -self._distance(first, second)

@@ -67,7 +67,7 @@ class CoarseBound:
         self.scene = scene
         self._restarts = restarts
         self._deadline = deadline
-        self._goals = goals
+        self._goals, self._early = goals, replace(goals, final=())
         self._solver = solver or default_solver(scene.robot.description)
         self._geometry = SceneGeometry(scene)
         self.facts = facts or Facts(self._geometry)
@@ -135,8 +135,7 @@ class CoarseBound:
 
     def _search(self, skeleton: Skeleton, prefix: CoarseSolution | None) -> CoarseSolution:
         """The verdict on a skeleton, whose prefix is feasible, without the goals' places."""
-        early = replace(self._goals, final=())
-        return self._first_feasible(self._programs(skeleton, early), prefix)
+        return self._first_feasible(self._programs(skeleton, self._early), prefix)
 
     def _first_feasible(self, programs: Programs, prefix: CoarseSolution | None) -> CoarseSolution:
         """Start after start until one leads to a verified solution, unless a fact forbids it.

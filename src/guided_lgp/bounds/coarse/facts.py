@@ -5,8 +5,9 @@ that has not moved. It says "impossible" only where that is so without all other
 sequence with such an action is infeasible.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -17,9 +18,12 @@ from guided_lgp.bounds.program.geometry import GraspSide, SceneGeometry
 from guided_lgp.bounds.program.grasp import INSET, PALM_GAP, grasp_sides
 from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.bounds.results import Array
-from guided_lgp.logic import Skeleton, successor
+from guided_lgp.logic import Skeleton, State, successor
 from guided_lgp.logic.domain import GroundInstruction
 from guided_lgp.scene.tolerances import GRASP_ANGLE, GRASP_OFFSET
+
+_KEPT = 400
+"""How many sequences are kept to go on from."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +51,7 @@ class Facts:
         self._arms = kinematics_of(robot.description).arms
         self._limbs = {name: Limb.of(arm, robot.fixed_values) for name, arm in self._arms.items()}
         self._known: dict[Hold, bool] = {}
+        self._walked = lru_cache(_KEPT)(self._walk)
 
     def impossible(self, skeleton: Skeleton) -> Hold | None:
         """What makes the last action of a skeleton impossible, as far as facts go."""
@@ -54,6 +59,8 @@ class Facts:
 
     def known(self, skeleton: Skeleton) -> Hold | None:
         """The same, as far as it has been asked for before: takes no time."""
+        if not any(self._known.values()):
+            return None
         return next((hold for hold in self._holds(skeleton) if self._known.get(hold)), None)
 
     def out_of_reach(self, hold: Hold) -> bool:
@@ -76,8 +83,9 @@ class Facts:
 
     def _holds(self, skeleton: Skeleton) -> Iterator[Hold]:
         """What the last action asks of its arms, where it is known where its body stands."""
-        *before, last = map(self._geometry.domain.bind, skeleton)
-        moved, loaded = self._moved(before, last.body)
+        last = self._geometry.domain.bind(skeleton[-1])
+        moved, state = self._walked(skeleton[:-1])
+        loaded = bool(state.carried_by(last.body))
         if last.parent not in self._arms:
             if last.parent not in moved:
                 yield from self._held(last, last.parent, loaded)
@@ -99,23 +107,19 @@ class Facts:
                     own = tuple(line for line in own if not line.up)
                 yield Hold(gripper, ground.body, support, own, loaded)
 
-    def _moved(
-        self, before: Sequence[GroundInstruction], body: str
-    ) -> tuple[dict[str, str | None], bool]:
-        """Where actions bring what they move, and whether a body carries others after them.
+    def _walk(self, skeleton: Skeleton) -> tuple[dict[str, str | None], State]:
+        """Where actions bring what they move, and the state after them.
 
-        Returns:
-            the support of what was put alone on one that has not moved, or None; and the answer.
+        The former is the support of what was put alone on one that has not moved, or None.
         """
-        state = self._geometry.scene.state
-        moved: dict[str, str | None] = {}
-        for ground in before:
-            carried = state.carried_by(ground.body)
-            alone = not carried and ground.parent not in moved and ground.parent not in self._arms
-            moved |= dict.fromkeys(carried)
-            moved[ground.body] = ground.parent if alone else None
-            state = successor(state, ground.action)
-        return moved, bool(state.carried_by(body))
+        if not skeleton:
+            return {}, self._geometry.scene.state
+        moved, state = self._walked(skeleton[:-1])
+        ground = self._geometry.domain.bind(skeleton[-1])
+        carried = state.carried_by(ground.body)
+        alone = not carried and ground.parent not in moved and ground.parent not in self._arms
+        moved = moved | dict.fromkeys(carried) | {ground.body: ground.parent if alone else None}
+        return moved, successor(state, ground.action)
 
     def _turns_freely(self, box: str) -> bool:
         """Whether a box is held the same from all around."""

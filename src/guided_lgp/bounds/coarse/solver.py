@@ -11,7 +11,13 @@ from numpy.typing import NDArray
 
 from guided_lgp.bounds.coarse.compiler import load_library
 from guided_lgp.bounds.program.arrays import Program
-from guided_lgp.bounds.program.inverse import closed_form_arms, closed_forms
+from guided_lgp.bounds.program.inverse import (
+    INPUTS,
+    ClosedForms,
+    Grid,
+    closed_form_arms,
+    closed_forms,
+)
 from guided_lgp.bounds.program.kernels import Kernel, KernelTable
 from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.bounds.results import Array
@@ -57,19 +63,11 @@ class Solution:
         return self.violation <= settings.tolerance
 
 
-class Solver(Protocol):
+class Solver(ClosedForms, Protocol):
     """Solves programs and closed-form inverse kinematics."""
 
     def solve(self, program: Program, values: Array, settings: Settings) -> Solution:
         """Solve from a start: values of the variables, then the constants."""
-        ...
-
-    def closed_form(self, chain: str, arguments: Array) -> Array:
-        """Closed-form inverse kinematics of a chain.
-
-        Arguments (count, 20) to joints and a cost (count, n + 1), see
-        :func:`guided_lgp.bounds.program.inverse.closed_form`.
-        """
         ...
 
 
@@ -90,6 +88,18 @@ class _CSettings(ctypes.Structure):
     )
 
 
+class _CGrid(ctypes.Structure):
+    _fields_ = (
+        ("shape", ctypes.c_int * 4),
+        *((field.name, ctypes.c_void_p) for field in fields(Grid)),
+    )
+
+    @classmethod
+    def of(cls, grid: Grid) -> "_CGrid":
+        arrays = grid.candidates, grid.grasp, grid.poses, grid.pitches, grid.ends
+        return cls(grid.shape, *map(address, arrays))
+
+
 @cache
 def _in_c(settings: Settings) -> _CSettings:
     return _CSettings(*astuple(settings))
@@ -102,9 +112,11 @@ class Compiled:
         self._solve = library.coarse_solve
         self._solve.restype = ctypes.c_int
         self._solve.argtypes = [ctypes.c_void_p] * 5
-        self._closed_form = library.coarse_closed_form
-        self._closed_form.restype = None
-        self._closed_form.argtypes = [ctypes.c_int] * 3 + [ctypes.c_void_p] * 2
+        self._holds = library.coarse_holds
+        self._least_costs = library.coarse_least_costs
+        for function in (self._holds, self._least_costs):
+            function.restype = None
+            function.argtypes = [ctypes.c_int] * 2 + [ctypes.c_void_p] * 3
         arms = closed_form_arms(kinematics_of(robot))
         self._forms = {name: (i, 1 + len(arm.home)) for i, (name, arm) in enumerate(arms.items())}
 
@@ -126,13 +138,23 @@ class Compiled:
         )
         return Solution(values, residuals, worst.value, steps)
 
-    def closed_form(self, chain: str, arguments: Array) -> Array:
-        """See :class:`Solver`."""
+    def holds(self, chain: str, grid: Grid) -> tuple[Array, Array]:
+        """See :class:`ClosedForms`."""
         number, outputs = self._forms[chain]
-        arguments = np.ascontiguousarray(arguments)
-        solutions = np.empty((len(arguments), outputs))
-        self._closed_form(number, outputs, len(arguments), address(arguments), address(solutions))
-        return solutions
+        poses, pitches, _, candidates = grid.shape
+        joints = np.empty((*grid.shape, outputs - 1))
+        costs = np.empty((poses, pitches, candidates))
+        header = _CGrid.of(grid)
+        self._holds(number, outputs, ctypes.addressof(header), address(joints), address(costs))
+        return joints, costs
+
+    def least_costs(self, chain: str, grid: Grid) -> Array:
+        """See :class:`ClosedForms`."""
+        number, outputs = self._forms[chain]
+        costs = np.empty((len(grid.poses), len(grid.pitches)))
+        header = _CGrid.of(grid)
+        self._least_costs(number, outputs, ctypes.addressof(header), None, address(costs))
+        return costs
 
 
 class Interpreter:
@@ -194,10 +216,15 @@ class Interpreter:
             penalty = min(penalty * settings.growth, settings.largest_penalty)
         return Solution(values, c, worst, tried)
 
-    def closed_form(self, chain: str, arguments: Array) -> Array:
-        """See :class:`Solver`."""
-        form = closed_forms(self._robot)[chain]
-        return np.array(form.map(len(arguments))(np.asarray(arguments).T)).T
+    def holds(self, chain: str, grid: Grid) -> tuple[Array, Array]:
+        """See :class:`ClosedForms`."""
+        form, arguments = closed_forms(self._robot)[chain], grid.arguments().reshape(-1, INPUTS)
+        solutions = np.array(form.map(len(arguments))(arguments.T)).T.reshape(*grid.shape, -1)
+        return solutions[..., :-1], solutions[..., -1].sum(axis=2)
+
+    def least_costs(self, chain: str, grid: Grid) -> Array:
+        """See :class:`ClosedForms`."""
+        return np.asarray(self.holds(chain, grid)[1].min(axis=2))
 
     def _arguments(self, program: Program, i: int, values: Array) -> tuple[Kernel, Array, Array]:
         kernel = self._table[program.kernel[i]]

@@ -23,7 +23,7 @@ class Starts:
     def __init__(self, geometry: SceneGeometry, solver: Solver) -> None:
         placed = geometry.scene.robot
         self._robot = kinematics_of(placed.description)
-        self._ik = start_ik(self._robot, tuple(placed.fixed_values.values()), solver.closed_form)
+        self._ik = start_ik(self._robot, tuple(placed.fixed_values.values()), solver)
 
     def draw(
         self,

@@ -10,6 +10,7 @@ tool frame's origin, which is between the fingertips, is over its side, by ``INS
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from itertools import product
 from typing import Any
 
@@ -41,6 +42,7 @@ Grip = tuple[float, float, float]
 """Pitch (rad), offset and depth (m)."""
 
 
+@lru_cache(maxsize=256)
 def grasp_sides(geometry: SceneGeometry, box: str, arm: Arm) -> tuple[GraspSide, ...]:
     """The sides of a box that a hand can close on; one for each grasp, where these are given."""
     body, half_height = geometry.movable[box], geometry.bodies[box].half[2]

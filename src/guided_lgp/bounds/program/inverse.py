@@ -5,6 +5,7 @@ general inverse kinematics.
 """
 
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from functools import cache, partial
 from typing import Any, Protocol
 
@@ -35,8 +36,50 @@ _VALUES = 12
 """Values of the redundant joint of any other arm, spread over its range."""
 _TURN = 2 * np.pi
 
-Evaluate = Callable[[str, Array], Array]
-"""Runs the closed form of a chain: its name and arguments (count, 20) to (count, n + 1)."""
+
+@dataclass(frozen=True)
+class Grid:
+    """Arguments of a closed form: every pose with every pitch, end and candidate."""
+
+    candidates: Array
+    """(C, 20) arguments of which those below are still to be filled in."""
+    grasp: Array
+    """(5,) offset, depth, half length, half height, turn."""
+    poses: Array
+    """(N, 4) x, y, yaw and z of the box."""
+    pitches: Array
+    """(M,)."""
+    ends: Array
+    """(E, 2) back along the approach and up."""
+
+    @property
+    def shape(self) -> tuple[int, int, int, int]:
+        """Numbers of poses, pitches, ends and candidates."""
+        return len(self.poses), len(self.pitches), len(self.ends), len(self.candidates)
+
+    def arguments(self) -> Array:
+        """All of them (N, M, E, C, 20)."""
+        filled = np.empty((*self.shape, INPUTS))
+        filled[...] = self.candidates
+        filled[..., :4] = self.poses[:, None, None, None]
+        filled[..., 4] = self.pitches[:, None, None]
+        filled[..., 5:7] = self.grasp[:2]
+        filled[..., 11] = self.ends[:, 1, None]
+        filled[..., 12:15] = self.grasp[2:]
+        filled[..., 15] = self.ends[:, 0, None]
+        return filled
+
+
+class ClosedForms(Protocol):
+    """Evaluates the closed forms of chains."""
+
+    def holds(self, chain: str, grid: Grid) -> tuple[Array, Array]:
+        """Joints (N, M, E, C, n), and the costs (N, M, C) of all ends together."""
+        ...
+
+    def least_costs(self, chain: str, grid: Grid) -> Array:
+        """The least of these costs (N, M)."""
+        ...
 
 
 class StartIk(Protocol):
@@ -55,9 +98,15 @@ class StartIk(Protocol):
             ends: (E, 2) back along the approach and up (m); the first is the contact.
 
         Returns:
-            joints (N, M, E, candidates, n) within their limits, and costs (N, M, E, candidates) of
+            joints (N, M, E, candidates, n) within their limits, and costs (N, M, candidates) of
             what is missing, of limits, and of the way. One candidate is one motion.
         """
+        ...
+
+    def least_costs(
+        self, held: HeldBox, hand: Hand, poses: Array, pitches: Array, ends: Array
+    ) -> Array:
+        """The least of these costs (N, M)."""
         ...
 
 
@@ -65,11 +114,11 @@ class ClosedForm:
     """By the formulas of a human-like arm, for several pans and both elbows."""
 
     def __init__(
-        self, arm: ArmKinematics, lifted: float, evaluate: Evaluate, flat: Callable[[], StartIk]
+        self, arm: ArmKinematics, lifted: float, forms: ClosedForms, flat: Callable[[], StartIk]
     ) -> None:
         self._flat = flat
         self._chain = arm.chain.name
-        self._evaluate = evaluate
+        self._forms = forms
         self._candidates = np.zeros((2 * len(_PANS), INPUTS))
         self._candidates[:, 7] = np.tile(_PANS, 2)
         self._candidates[:, 8] = np.repeat([1.0, -1.0], len(_PANS))
@@ -82,19 +131,19 @@ class ClosedForm:
         """See :class:`StartIk`."""
         if held.side.flat:  # the formulas are for fingers that close on upright sides
             return self._flat()(held, hand, poses, pitches, ends)
-        shape = (len(poses), len(pitches), len(ends), 2 * len(_PANS))
-        arguments = np.empty((*shape, INPUTS))
-        arguments[...] = self._candidates
-        arguments[..., :4] = poses[:, None, None, None]
-        arguments[..., 4] = pitches[:, None, None]
-        arguments[..., 5:7] = hand
-        arguments[..., 11] = ends[:, 1, None]
-        side = held.side
-        arguments[..., 12:15] = side.half_length, held.half_height, side.turn
-        arguments[..., 15] = ends[:, 0, None]
-        found = self._evaluate(self._chain, arguments.reshape(-1, INPUTS))
-        solutions = found.reshape(*shape, -1)
-        return solutions[..., :-1], solutions[..., -1]
+        return self._forms.holds(self._chain, self._grid(held, hand, poses, pitches, ends))
+
+    def least_costs(
+        self, held: HeldBox, hand: Hand, poses: Array, pitches: Array, ends: Array
+    ) -> Array:
+        """See :class:`StartIk`."""
+        if held.side.flat:
+            return self._flat().least_costs(held, hand, poses, pitches, ends)
+        return self._forms.least_costs(self._chain, self._grid(held, hand, poses, pitches, ends))
+
+    def _grid(self, held: HeldBox, hand: Hand, poses: Array, pitches: Array, ends: Array) -> Grid:
+        grasp = np.array([*hand, held.side.half_length, held.half_height, held.side.turn])
+        return Grid(self._candidates, grasp, poses, pitches, ends)
 
 
 class General:
@@ -126,7 +175,14 @@ class General:
         within = np.clip(joints, *self._limits)
         values, limited = (np.moveaxis(array, -1, 0) for array in (joints, within))
         costs = _cost(values, limited, lost, self._home[:_SHOULDER_JOINTS])
-        return within.reshape(*candidates, joints.shape[-1]), costs.reshape(candidates)
+        costs = costs.reshape(candidates).sum(axis=2)
+        return within.reshape(*candidates, joints.shape[-1]), costs
+
+    def least_costs(
+        self, held: HeldBox, hand: Hand, poses: Array, pitches: Array, ends: Array
+    ) -> Array:
+        """See :class:`StartIk`."""
+        return np.asarray(self(held, hand, poses, pitches, ends)[1].min(axis=2))
 
     def _followed(self, q: Array, missing: Array) -> tuple[Array, Array]:
         """For every branch at the contact, the nearest one at each end.
@@ -150,21 +206,21 @@ _LOST = 100.0
 
 
 def start_ik(
-    kinematics: RobotKinematics, fixed: tuple[float, ...], evaluate: Evaluate
+    kinematics: RobotKinematics, fixed: tuple[float, ...], forms: ClosedForms
 ) -> dict[str, StartIk]:
     """The inverse kinematics of every arm, by gripper.
 
     Args:
         kinematics: of the robot.
         fixed: values of the joints that the scene sets.
-        evaluate: runs closed forms.
+        forms: evaluates closed forms.
     """
     closed = closed_form_arms(kinematics)
     found: dict[str, StartIk] = {}
     for gripper, arm in kinematics.arms.items():
         general = cache(partial(General, kinematics.robot, arm, fixed))
         found[gripper] = (
-            ClosedForm(arm, _lifted(arm.chain, fixed), evaluate, general)
+            ClosedForm(arm, _lifted(arm.chain, fixed), forms, general)
             if arm.chain.name in closed
             else general()
         )

@@ -20,6 +20,7 @@ from guided_lgp.bounds.program.grasp import (
     PALM_GAP,
     ROLL,
     Grip,
+    Hand,
     grasp_sides,
     read_grip,
     sides_of,
@@ -243,10 +244,12 @@ def start(draft: Draft, held: HeldBox) -> None:
         draft.values[held.pitch] = tried[0]
     for configuration, place in zip(configurations, places, strict=True):
         if configuration.joints[0] >= draft.kept:
-            joints, costs = _solutions(draft, held, place[None], configuration.segments, tried)
+            ends = _ends(configuration.segments)
+            solve = draft.ik[held.gripper]
+            joints, costs = solve(held, _hand(draft, held), place[None], tried, ends)
             chosen = draft.choose(costs[0, 0])
-            ends = (configuration.joints, *(s.joints for s in configuration.segments))
-            for slots, values in zip(ends, joints[0, 0, :, chosen], strict=True):
+            slots_of = (configuration.joints, *(s.joints for s in configuration.segments))
+            for slots, values in zip(slots_of, joints[0, 0, :, chosen], strict=True):
                 draft.values[list(slots)] = values
 
 
@@ -265,25 +268,17 @@ def least_costs(
     tried: Array,
 ) -> Array:
     """Least cost (len(poses), len(pitches)) of holding a box there, over the redundant joint."""
-    return np.asarray(_solutions(draft, held, poses, segments, tried)[1].min(axis=2))
+    hand, ends = _hand(draft, held), _ends(segments)
+    return draft.ik[held.gripper].least_costs(held, hand, poses, tried, ends)
 
 
-def _solutions(
-    draft: Draft,
-    held: HeldBox,
-    poses: Array,
-    segments: tuple[StraightSegment, ...],
-    tried: Array,
-) -> tuple[Array, Array]:
-    """Inverse kinematics of a contact and the ends of its segments.
+def _hand(draft: Draft, held: HeldBox) -> Hand:
+    return float(draft.values[held.offset]), float(draft.values[held.depth])
 
-    Returns:
-        joints (poses, pitches, 1 + segments, candidates, n) and costs (poses, pitches, candidates).
-    """
-    ends = np.array([(0.0, 0.0), *((segment.back, segment.up) for segment in segments)])
-    offset, depth = draft.values[[held.offset, held.depth]].tolist()
-    joints, costs = draft.ik[held.gripper](held, (offset, depth), poses, tried, ends)
-    return joints, costs.sum(axis=2)
+
+def _ends(segments: tuple[StraightSegment, ...]) -> Array:
+    """How far (1 + segments, 2) back and up the hand is, the contact first."""
+    return np.array([(0.0, 0.0), *((segment.back, segment.up) for segment in segments)])
 
 
 _PITCHES = np.pi * np.array([0.2, 0.35, 0.5, 0.65, 0.8])

@@ -16,6 +16,11 @@ HAND_DEPTH = 0.02
 """How deep (m) a hull of the hand may reach into the box it holds, approaches or leaves. The
 hulls bridge the hollow of the fingers: on a box that fills the hand they overlap it by 15 mm."""
 
+Stack = tuple[str, Pose | None, Mapping[str, Pose]]
+"""What a box stands on, with its pose if it is a box, and the poses of all above that, by name."""
+NOTHING: Mapping[str, Stack] = {}
+"""No stacks."""
+
 _SAME = 1e-6
 """Distance (m) of places that are one, but for rounding."""
 
@@ -51,16 +56,28 @@ def grasp_faults(
     return sorted(found, key=lambda violation: -violation.amount)
 
 
+def stacks(boxes: Mapping[str, Pose], support: Mapping[str, str]) -> dict[str, Stack]:
+    """All that it depends on whether boxes stand: a support, and boxes with all that they carry."""
+    return {
+        box: (below, boxes.get(below), {n: boxes[n] for n in balanced.whole_stack(box, support)})
+        for box, below in support.items()
+    }
+
+
 def placement_faults(
-    scene: Scene, boxes: Mapping[str, Pose], support: Mapping[str, str]
+    scene: Scene,
+    boxes: Mapping[str, Pose],
+    support: Mapping[str, str],
+    among: Collection[str] | None = None,
 ) -> list[Violation]:
-    """Whether boxes stand level on their supports and do not fall.
+    """Whether boxes, by default all, stand level on their supports and do not fall.
 
     Near an edge, a stack that nobody has touched may stay as the scene has it.
     """
     sizes, masses = box_sizes(scene), volumes(scene)
     found = []
-    for box, below in support.items():
+    for box in support if among is None else among:
+        below = support[box]
         top = top_of(scene, boxes, below)
         excess = {
             "stand": stand.check(sizes[box], boxes[box], top),

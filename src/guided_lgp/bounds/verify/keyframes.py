@@ -1,7 +1,7 @@
 """Verification of keyframes."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from weakref import WeakKeyDictionary
 
@@ -18,9 +18,17 @@ from guided_lgp.bounds.checks import (
 from guided_lgp.bounds.results import Array, Keyframe
 from guided_lgp.bounds.terms import carried
 from guided_lgp.bounds.terms.carried import relative
-from guided_lgp.bounds.verify.geometry import declared, grasp_faults, placement_faults
-from guided_lgp.logic import Action, Skeleton, State, successor
+from guided_lgp.bounds.verify.geometry import (
+    NOTHING,
+    Stack,
+    declared,
+    grasp_faults,
+    placement_faults,
+    stacks,
+)
+from guided_lgp.logic import Action, Skeleton, State, progress, successor
 from guided_lgp.robots import Fingers, Robot
+from guided_lgp.scene import Scene
 from guided_lgp.scene.world import World, at_side, poses_at_side
 
 LIMIT_TOLERANCE = 1e-6
@@ -42,32 +50,40 @@ def verify_keyframe(
     Returns:
         What is violated; nothing if the keyframe is good.
     """
-    return _faults(world, _Reached(world, keyframe), state, action)
+    (reached,) = _reached(world.scene, [keyframe])
+    return _faults(world, reached, state, action)
 
 
 def _faults(
-    world: World, reached: "_Reached", state: State, action: Action | None
+    world: World,
+    reached: "_Reached",
+    state: State,
+    action: Action | None,
+    good: Mapping[str, Stack] = NOTHING,
 ) -> list[Violation]:
-    """What is violated in a keyframe to which the world has been set."""
+    """What is violated in a keyframe; some stacks have been found good before."""
     if not reached.is_finite:
         return [Violation("finite pose", math.nan)]
     after = state if action is None else successor(state, action)
     held = tuple(dict.fromkeys((*state.held, *after.held)))
     support = dict(state.support) | dict(after.support)
     convex, robot = box_bodies(world.scene), world.scene.robot.description
-    given = given_grasps(world.scene)
-    boxes, violations = reached.boxes, joint_limit_faults(robot, reached.q)
+    given, fingers = given_grasps(world.scene), dict[str, float]()
+    boxes, violations = reached.boxes, joint_limit_faults(robot, reached.keyframe.q)
     for box, gripper in held:
         arm, tool = robot.arms[gripper], reached.tools[gripper]
         width = convex[box].size[closing_axis(boxes[box], tool)]
         keeps = (box, gripper) in state.held and (box, gripper) in after.held
-        world.set_fingers({gripper: _finger_value(arm.fingers, width, keeps)})
+        fingers[gripper] = _finger_value(arm.fingers, width, keeps)
         violations += grasp_faults(arm, box, convex[box], boxes[box], tool, given.get(box))
-    violations += placement_faults(world.scene, boxes, support)
+    reached.stacks = stacks(boxes, support)
+    changed = [box for box, stack in reached.stacks.items() if good.get(box) != stack]
+    violations += placement_faults(world.scene, boxes, support, changed)
+    world.set(reached.keyframe.q, reached.keyframe.boxes, fingers)
     bodies = body_names(world.scene)
     violations += [
         Violation(overlap_name(overlap.first, overlap.second, bodies), overlap.depth)
-        for overlap in world.penetrations()
+        for overlap in world.penetrations(touching=support.items())
         if not declared(overlap, robot, held, support)
     ]
     return violations
@@ -95,23 +111,29 @@ def verify_keyframes(
     Returns:
         The first violation with its action, or None.
     """
-    state = world.scene.state
-    start = Keyframe(at_side(world.scene), poses_at_side(world.scene))
-    for action in skeleton[:verified]:
-        state = successor(state, action)
-    first = after_action[verified - 1] if verified else start
-    last = _REACHED.get(first) or _Reached(world, first)
+    state = progress(world.scene.state, skeleton[:verified])
+    last = _last_before(world.scene, after_action[:verified])
+    pairs = zip(at_switch[verified:], after_action[verified:], strict=True)
+    frames = iter(_reached(world.scene, [frame for pair in pairs for frame in pair]))
     for index, action in enumerate(skeleton[verified:], verified):
         after = successor(state, action)
-        moves = ((at_switch[index], state, action), (after_action[index], after, None))
-        for keyframe, modes, contact in moves:
-            reached = _REACHED[keyframe] = _Reached(world, keyframe)
-            found = _faults(world, reached, modes, contact) or _slips(last, reached, modes)
+        for modes, contact in ((state, action), (after, None)):
+            reached = next(frames)
+            found = _faults(world, reached, modes, contact, last.stacks)
+            found = found or _slips(last, reached, modes)
             if found:
                 return Violation(found[0].constraint, found[0].amount, index)
-            last = reached
+            last = _REACHED[reached.keyframe] = reached
         state = after
     return None
+
+
+def _last_before(scene: Scene, after_action: Sequence[Keyframe]) -> "_Reached":
+    """The last keyframe that was checked before, or else the start."""
+    if not after_action:
+        start = Keyframe(at_side(scene), poses_at_side(scene))
+        return _reached(scene, [start])[0]
+    return _REACHED.get(after_action[-1]) or _reached(scene, after_action[-1:])[0]
 
 
 @lru_cache(maxsize=1024)
@@ -134,25 +156,32 @@ def joint_limit_faults(robot: Robot, q: Array) -> list[Violation]:
 
 
 class _Reached:
-    """A keyframe to which the world is set, and where boxes and tools are then."""
+    """A keyframe, and where boxes and tools are then, in plain numbers."""
 
-    def __init__(self, world: World, keyframe: Keyframe) -> None:
-        self.q = keyframe.q
+    def __init__(self, keyframe: Keyframe, tools: dict[str, list[float]]) -> None:
+        self.keyframe, self.tools = keyframe, tools
         self.boxes = {name: placement.tolist() for name, placement in keyframe.boxes.items()}
         self.is_finite = math.isfinite(sum(map(sum, self.boxes.values())))
-        self.tools: dict[str, list[float]] = {}
-        if self.is_finite:
-            world.set(keyframe.q, keyframe.boxes)
-            grippers = world.scene.robot.description.grippers
-            self.tools = dict(zip(grippers, world.tool_poses(grippers).tolist(), strict=True))
+        self.stacks = NOTHING
+        """Those that have been looked at."""
 
     def carrier(self, name: str) -> list[float] | None:
         """The pose of a tool or box; of what never moves, none."""
         return self.tools.get(name) or self.boxes.get(name)
 
 
+def _reached(scene: Scene, keyframes: Sequence[Keyframe]) -> list[_Reached]:
+    """Of all keyframes at once, where the tools are."""
+    poses = scene.robot.tool_poses(np.array([keyframe.q for keyframe in keyframes]))
+    tools = {gripper: rows.tolist() for gripper, rows in poses.items()}
+    return [
+        _Reached(keyframe, {gripper: rows[number] for gripper, rows in tools.items()})
+        for number, keyframe in enumerate(keyframes)
+    ]
+
+
 _REACHED: WeakKeyDictionary[Keyframe, _Reached] = WeakKeyDictionary()
-"""What has been checked and may be gone on from: there is no need to set the world to it again."""
+"""What has been found good and may be gone on from."""
 
 
 def _slips(last: _Reached, reached: _Reached, state: State) -> list[Violation]:
