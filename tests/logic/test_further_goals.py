@@ -123,5 +123,5 @@ def test_a_posture_is_no_place() -> None:
     assert satisfied(START, objective)
     assert not asks_for_places(objective, SYMBOLS)
     assert encodable(objective, SYMBOLS) == ()
-    (term,) = DOMAIN.final_terms(objective[0])
+    (term,) = DOMAIN.posture_terms(objective[0])
     assert (term.symbols, term.options) == (("pr2L",), {"joint1": 0, "joint2": 0.5, "joint3": -1})

@@ -27,17 +27,16 @@ class GoalTerms:
     @classmethod
     def of(cls, objective: Objective, domain: Domain) -> "GoalTerms":
         """The terms of all goals."""
-        final = [term for goal in objective for term in domain.final_terms(goal)]
         return cls(
-            tuple(term for term in final if term.name != "posture"),
+            tuple(term for goal in objective for term in domain.final_terms(goal)),
             tuple(term for goal in objective for term in domain.lasting_terms(goal)),
-            tuple(term for term in final if term.name == "posture"),
+            tuple(term for goal in objective for term in domain.posture_terms(goal)),
         )
 
     @property
     def upright(self) -> frozenset[str]:
         """The boxes that stay level on their way."""
-        return frozenset(term.symbols[0] for term in self.lasting if term.name == "upright")
+        return frozenset(term.symbols[0] for term in self.lasting if find_term(term.name).levels)
 
     @property
     def ends(self) -> dict[str, Array]:

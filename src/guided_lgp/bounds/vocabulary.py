@@ -4,7 +4,6 @@ from collections.abc import Iterable
 from inspect import BoundArguments, Parameter, signature
 
 from guided_lgp.bounds.terms import find_term, term_names
-from guided_lgp.bounds.terms.term import GoalTerm
 from guided_lgp.errors import InputError
 from guided_lgp.logic import Domain
 from guided_lgp.logic.declarations import GoalType, Instruction, Term, Variable, on
@@ -33,13 +32,11 @@ def _check_goal_type(where: str, goal_type: GoalType) -> None:
     names = [number.name for number in goal_type.numbers]
     names += [f"{goal_type.series}1"] if goal_type.series else []
     options = dict.fromkeys(names, 0.0)
-    for term in goal_type.lasting:
-        _check_term(f"{where}, lasting", "lasting", term, options)
+    for part in ("lasting", "postures", "final"):
+        for term in getattr(goal_type, part):
+            _check_term(f"{where}, {part}", part, term, options)
     for term in goal_type.final:
-        _check_term(f"{where}, final", "final", term, options)
-        if isinstance(find_term(term.name), GoalTerm) and on(*term.arguments) not in (
-            goal_type.condition
-        ):
+        if on(*term.arguments) not in goal_type.condition:
             needed = _written("on", term.arguments)
             raise InputError(f"{where}, condition", f"lacks {needed}", f"what {term.name} needs")
 

@@ -79,6 +79,6 @@ DOMAIN = Domain(
         ),
         GoalType("in", (b, t), (on(b, t),), numbers=numbers("x0 y0 x1 y1"), final=(within(b, t),)),
         GoalType("upright", (b,), lasting=(upright(b),)),
-        GoalType("posture", (g,), series="joint", final=(posture(g),)),
+        GoalType("posture", (g,), series="joint", postures=(posture(g),)),
     ),
 )

@@ -198,8 +198,8 @@ class GoalType:
     """A kind of goal: what must be true of its parameters, and where it leaves a body.
 
     Numbers follow the parameters in a goal's text. ``final`` are the terms that hold at the end of
-    a plan, ``lasting`` those that hold all the time; a term has the numbers as options,
-    those of a series called ``joint`` as ``joint1``, ``joint2``, ...
+    a plan for bodies, ``postures`` those for arms, ``lasting`` those that hold all the time; a term
+    has the numbers as options, those of a series called ``joint`` as ``joint1``, ``joint2``, ...
     """
 
     name: str
@@ -209,6 +209,7 @@ class GoalType:
     series: str = ""
     """The name of further numbers, one or more: their count depends on a symbol."""
     final: tuple[Term, ...] = ()
+    postures: tuple[Term, ...] = ()
     lasting: tuple[Term, ...] = ()
     derived: Variable | None = None
     """The parameter that a text may leave out: what is below the pose that the numbers give."""

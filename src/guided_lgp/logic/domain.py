@@ -159,12 +159,16 @@ class Domain:
         raise InputError(f"goal {str(goal)!r}", "is not a goal", signatures(every))
 
     def final_terms(self, goal: Goal) -> tuple[GroundTerm, ...]:
-        """The terms that a goal adds to the end of a plan.
+        """The terms on bodies that a goal adds to the end of a plan.
 
         Raises:
             InputError: as for ``goal_type``, or a number cannot be read.
         """
         return _goal_terms(self, goal, self.goal_type(goal).final)
+
+    def posture_terms(self, goal: Goal) -> tuple[GroundTerm, ...]:
+        """The terms on arms that a goal adds to the end of a plan; see ``final_terms``."""
+        return _goal_terms(self, goal, self.goal_type(goal).postures)
 
     def lasting_terms(self, goal: Goal) -> tuple[GroundTerm, ...]:
         """The terms that a goal adds to every moment; see ``final_terms``."""

@@ -103,8 +103,7 @@ def _implied(goal: Goal, symbols: Symbols) -> Iterator[Goal]:
 
 def asks_for_places(objective: Objective, symbols: Symbols) -> bool:
     """Whether a state does not tell whether bodies are where an objective wants them."""
-    terms = (term for goal in objective for term in symbols.domain.final_terms(goal))
-    return any(term.symbols[0] not in symbols.grippers for term in terms)
+    return any(symbols.domain.final_terms(goal) for goal in objective)
 
 
 def parents_wanted_by(goal: Goal, symbols: Symbols) -> Mapping[str, frozenset[str]]:

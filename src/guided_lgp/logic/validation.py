@@ -131,11 +131,12 @@ def _check_goal_type(one: GoalType, domain: "Domain", refuse: Refuse) -> None:
     _check_parameters(field, one.parameters, domain, refuse)
     _check_names(f"{field}, numbers", [number.name for number in one.numbers], refuse)
     _check_atoms(f"{field}, condition", one.condition, one, domain, refuse)
-    _check_terms(f"{field}, final", one.final, one, refuse)
-    _check_terms(f"{field}, lasting", one.lasting, one, refuse)
-    if not (one.condition or one.final or one.lasting):
+    for part in ("final", "postures", "lasting"):
+        _check_terms(f"{field}, {part}", getattr(one, part), one, refuse)
+    terms = (*one.final, *one.postures, *one.lasting)
+    if not (one.condition or terms):
         raise refuse(f"{field}, condition", "is empty", "one or more atoms")
-    if (one.numbers or one.series) and not (one.final or one.lasting):
+    if (one.numbers or one.series) and not terms:
         raise refuse(f"{field}, final", "is empty", "one or more terms, for the numbers")
     if one.derived is not None:
         _check_arguments(f"{field}, derived", [one.derived], one, refuse)

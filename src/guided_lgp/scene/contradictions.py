@@ -86,8 +86,6 @@ def _places(objective: Objective, scene: Scene) -> Iterator[_Place]:
     supports = movable | {support.name: support for support in scene.supports}
     for goal in objective:
         for term in scene.symbols.domain.final_terms(goal):
-            if term.name == "posture":
-                continue
             body, support = term.symbols
             numbers = {name: float(value) for name, value in term.options.items()}
             yield _Place(goal, movable[body], supports[support], support in movable, numbers)

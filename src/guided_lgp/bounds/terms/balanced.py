@@ -1,6 +1,6 @@
 """``balanced(box, support)``: the centres of mass of a stack are above what supports it."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 
 import casadi as ca
 import numpy as np
@@ -10,8 +10,7 @@ from guided_lgp.bounds.program.context import Context
 from guided_lgp.bounds.program.kernels import SCALE, Kernel, in_frame, kernel
 from guided_lgp.bounds.program.kinematics import RobotKinematics
 from guided_lgp.bounds.program.slots import ZERO
-from guided_lgp.bounds.terms.term import Term
-from guided_lgp.logic.declarations import Instruction, Variable
+from guided_lgp.bounds.terms.term import Term, put_down
 from guided_lgp.scene.tolerances import BALANCE_INSET
 
 STACK = 8
@@ -108,10 +107,4 @@ def _centre_of_mass(
     return x, y, z
 
 
-def _needed(one: Instruction) -> Iterator[tuple[Variable, ...]]:
-    """Of what is put down."""
-    if not one.into_hand:
-        yield one.attached.body, one.attached.parent
-
-
-TERM = Term(_add, _kernels, needed=_needed)
+TERM = Term(_add, _kernels, needed=put_down)

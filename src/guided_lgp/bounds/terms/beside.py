@@ -17,7 +17,7 @@ from guided_lgp.bounds.program.kernels import SCALE, Kernel, absolute, kernel
 from guided_lgp.bounds.program.kinematics import RobotKinematics
 from guided_lgp.bounds.program.slots import PlanarPose
 from guided_lgp.bounds.results import Array
-from guided_lgp.bounds.terms.term import Term
+from guided_lgp.bounds.terms.term import Term, put_down
 from guided_lgp.logic.declarations import Instruction, Variable
 
 _TOUCH = 0.002
@@ -120,9 +120,8 @@ _QUARTERS = np.arange(4) * np.pi / 2
 
 def _needed(one: Instruction) -> Iterator[tuple[Variable, ...]]:
     """Of what is put down, and of what is lifted off its support."""
-    if not one.into_hand:
-        yield one.attached.body, one.attached.parent
-    elif one.holder is None:
+    yield from put_down(one)
+    if one.into_hand and one.holder is None:
         yield (one.attached.body,)
 
 

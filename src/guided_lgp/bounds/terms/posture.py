@@ -8,4 +8,4 @@ def _add(context: Context, gripper: str, **values: float) -> None:
     """At keyframes, arms are at their contacts or at their side."""
 
 
-TERM = Term(_add, part="final")
+TERM = Term(_add, part="postures")

@@ -1,6 +1,6 @@
 """``stand(box, support)``: a box is put down level on a support, with all that it carries."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,8 +14,7 @@ from guided_lgp.bounds.terms import carried
 from guided_lgp.bounds.terms.balanced import inner
 from guided_lgp.bounds.terms.beside import Separation
 from guided_lgp.bounds.terms.hold import least_costs, pitches
-from guided_lgp.bounds.terms.term import Term
-from guided_lgp.logic.declarations import Instruction, Variable
+from guided_lgp.bounds.terms.term import Term, put_down
 from guided_lgp.scene.tolerances import HEIGHT, LEVEL_ANGLE
 
 CANDIDATES = 6
@@ -127,10 +126,4 @@ def gap(size: Vector, placement: Pose, top: Top) -> float:
     return abs(placement[2] - size[2] / 2 - top.height)
 
 
-def _needed(one: Instruction) -> Iterator[tuple[Variable, ...]]:
-    """Of what is put down."""
-    if not one.into_hand:
-        yield one.attached.body, one.attached.parent
-
-
-TERM = Term(_add, attaches="table", needed=_needed)
+TERM = Term(_add, attaches="table", needed=put_down)

@@ -1,6 +1,6 @@
 """What every term has."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Literal
 
@@ -28,12 +28,20 @@ class Term:
 
     add: Callable[..., None]
     kernels: Callable[[RobotKinematics], tuple[Kernel, ...]] = _none
-    part: Literal["contact", "final", "lasting"] = "contact"
-    """Where declarations name it."""
+    part: Literal["contact", "final", "postures", "lasting"] = "contact"
+    """Where declarations name it: of an instruction, or of a goal type."""
+    levels: bool = False
+    """Whether a hand that holds what it names keeps that level, all the time."""
     attaches: str = ""
     """The type of parent on which a body hangs by it, if one does."""
     needed: Callable[[Instruction], Iterable[tuple[Variable, ...]]] = _never
     """With which arguments an instruction has to name it, by what it attaches to what."""
+
+
+def put_down(instruction: Instruction) -> Iterator[tuple[Variable, ...]]:
+    """Of what is put down: the body and its support."""
+    if not instruction.into_hand:
+        yield instruction.attached.body, instruction.attached.parent
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,7 +53,7 @@ class GoalTerm(Term):
     ``check(size, placement, top, **numbers)`` is by how much (m or rad) the term does not hold.
     """
 
-    part: Literal["contact", "final", "lasting"] = "final"
+    part: Literal["contact", "final", "postures", "lasting"] = "final"
     draw: Callable[..., Array]
     check: Callable[..., float]
 

@@ -9,4 +9,4 @@ def _add(context: Context, box: str) -> None:
     context.upright |= {box}
 
 
-TERM = Term(_add, part="lasting")
+TERM = Term(_add, part="lasting", levels=True)
