@@ -8,14 +8,21 @@ import pytest
 from motions import PR2, Motion, grasp, scene
 
 from guided_lgp.bounds.checks import volumes
-from guided_lgp.bounds.results import Array, Trajectory
+from guided_lgp.bounds.results import Array, Attachment, Trajectory
 from guided_lgp.bounds.verify import efforts, verify_path
 from guided_lgp.bounds.verify.attachments import switches_of
-from guided_lgp.bounds.verify.efforts import carried_boxes, derivatives, joint_efforts
+from guided_lgp.bounds.verify.efforts import (
+    Carried,
+    Load,
+    carried_boxes,
+    derivatives,
+    joint_efforts,
+    overloads,
+)
 from guided_lgp.bounds.verify.joints import rows_outside_limits
 from guided_lgp.logic import parse_skeleton
 from guided_lgp.poses import compose
-from guided_lgp.scene import Scene
+from guided_lgp.scene import PlacedRobot, Scene
 from guided_lgp.scene.world import BOX_DENSITY, World
 
 SKELETON = parse_skeleton("(grasp pr2L red)")
@@ -63,6 +70,22 @@ def test_efforts_are_those_of_pinocchio_with_the_box_in_the_hand(
     expected -= pinocchio.computeGeneralizedGravity(bare, bare.createData(), full)
     assert np.abs(expected[columns]).max() > 1.0
     np.testing.assert_allclose(found[row - 1], expected[columns], atol=0.02)
+
+
+def test_what_a_motor_cannot_hold_at_rest_is_named(start: Scene) -> None:
+    """Baxter's stretched arm with a box in its hand, against a motion in which nothing moves."""
+    baxter = start.model_copy(update={"robot": PlacedRobot(model="baxter"), "boxes": start.boxes})
+    robot, q = baxter.robot.description, np.zeros(14)
+    grip = np.array([0.02, 0.01, 0.0, 0.0, 0.0, 0.0, 1.0])
+    still = Carried(Attachment("red", "left", 0, 2), grip)
+    torques = joint_efforts(baxter, np.tile(q, (3, 1)), np.array([0.0, 0.1, 0.2]), [still])[0]
+    excess = np.abs(torques) / robot.effort_limits - 1
+    found = overloads(baxter, q, [Load("left", "red", grip[:3])])
+    assert [fault.constraint for fault in found] == ["effort left_s1", "effort right_s1"]
+    left, right = (fault.amount for fault in found)
+    assert left == pytest.approx(excess[1])
+    assert left > right == pytest.approx(excess[8])
+    assert not overloads(start, PR2.home, [])
 
 
 def _fault(scene: Scene, trajectory: Trajectory) -> str:

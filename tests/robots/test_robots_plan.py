@@ -9,7 +9,10 @@ import pytest
 import guided_lgp.robots as robots_folder
 from guided_lgp.bounds.execution import execute
 from guided_lgp.bounds.scene_bounds import SceneBounds
-from guided_lgp.logic import parse_objective, parse_skeleton
+from guided_lgp.bounds.verify import efforts
+from guided_lgp.bounds.verify.attachments import switches_of
+from guided_lgp.bounds.verify.joints import rows_outside_limits
+from guided_lgp.logic import Skeleton, parse_objective, parse_skeleton
 from guided_lgp.params import load_params
 from guided_lgp.paths import EXAMPLES, SOURCES
 from guided_lgp.planning import plan
@@ -78,6 +81,35 @@ def test_a_plan_is_verified_and_carried_out(robot: str) -> None:
     assert result.trajectory is not None, result.failure
     goals = parse_objective(["(on green tab2)", "(on red green)"])
     assert execute(placed, goals, skeleton, result.trajectory).success
+
+
+def _baxter(ahead: float) -> tuple[SceneBounds, Skeleton]:
+    """A box that the left arm takes somewhere ahead (m), and puts down again."""
+    near = scene("baxter")
+    red = near.boxes[0].model_copy(update={"position": (ahead, 0.40, -0.06), "yaw": -1.3})
+    placed = near.model_copy(update={"boxes": (red,)})
+    skeleton = parse_skeleton("(grasp left red) (place left red tab1)")
+    return SceneBounds(placed, load_params(SOURCES / "params.yaml").bounds), skeleton
+
+
+def test_a_stretched_arm_moves_as_slowly_as_its_motors_need() -> None:
+    bounds, skeleton = _baxter(0.74)
+    result = bounds.path(skeleton)
+    assert result.trajectory is not None, result.failure
+    times, q = result.trajectory.times, result.trajectory.q
+    switches = switches_of(bounds.scene, skeleton, result.trajectory)
+    assert isinstance(switches, list)
+    assert not rows_outside_limits(bounds.scene, skeleton, switches, q, times)["effort"]
+    assert rows_outside_limits(bounds.scene, skeleton, switches, q, times / 2)["effort"]
+
+
+def test_what_motors_cannot_hold_is_infeasible(monkeypatch: pytest.MonkeyPatch) -> None:
+    bounds, skeleton = _baxter(0.62)
+    assert bounds.coarse(skeleton).feasible
+    monkeypatch.setattr(efforts, "BOX_DENSITY", 20_000.0)  # kg/m³: as heavy as gold
+    result = _baxter(0.62)[0].coarse(skeleton)
+    assert not result.feasible
+    assert str(result.failure).startswith("action 1: effort left_")
 
 
 def test_what_the_arm_cannot_reach_is_infeasible() -> None:

@@ -34,13 +34,16 @@ def stay(scene: Scene) -> PathResult:
     return PathResult((), feasible=True, trajectory=rest)
 
 
-def assemble(robot: Robot, start: Situation, steps: Iterable[Step]) -> Trajectory:
+def assemble(
+    robot: Robot, start: Situation, steps: Iterable[Step], pace: float = 1.0
+) -> Trajectory:
     """Time all motions and join them.
 
     Args:
         robot: whose joints move.
         start: where the robot is before the first step.
         steps: each continues where the one before ended.
+        pace: how many times slower arms move than they could.
     """
     fingers = [arm.fingers.ratios * start.fingers[g] for g, arm in robot.arms.items()]
     rows = [np.concatenate([start.q, *fingers])[None]]
@@ -53,8 +56,8 @@ def assemble(robot: Robot, start: Situation, steps: Iterable[Step]) -> Trajector
         match step:
             case Motion(arm):
                 clock, values = step.timed
-                if sum(holder == arm.gripper for holder, _ in open_since.values()) > 1:
-                    clock = _CAREFUL * clock
+                stacked = sum(holder == arm.gripper for holder, _ in open_since.values()) > 1
+                clock = (_CAREFUL if stacked else pace) * clock
                 columns = arm.slice
             case Fingers(gripper, value):
                 joints = robot.arms[gripper].fingers

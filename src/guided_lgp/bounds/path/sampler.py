@@ -167,12 +167,14 @@ class OutcomeSampler:
         choices = solutions.order(contacts.cost)[:_CONFIGURATIONS]
         postures = Postures(task.mover, at, off, solutions.chosen(choices))
         for row, choice in enumerate(choices):
-            number, *_ = choice
+            number, value, branch = choice
             if attempts[number] >= _POSTURES:
                 continue
             if task.met(index, Stage.CONTACT, "at the contact", postures.met_at(row)):
                 continue
             if task.met(index, Stage.OFF, "before the contact", postures.met_off(row)):
+                continue
+            if task.overloaded(index, situation, solutions.q[number, :, value, branch]):
                 continue
             if not contacts.possible(number):
                 continue

@@ -14,6 +14,7 @@ from guided_lgp.bounds.path.motions import Motion, Mover, Pair, Surroundings, To
 from guided_lgp.bounds.path.situation import Situation, Step, situation_at_start, tool_pose
 from guided_lgp.bounds.path.steps import manoeuvre
 from guided_lgp.bounds.results import Array, Keyframe
+from guided_lgp.bounds.verify.efforts import Load, overloads
 from guided_lgp.logic import Skeleton, successor
 from guided_lgp.poses import compose, pose
 from guided_lgp.robots import PlacedArm
@@ -25,6 +26,9 @@ _SHIFTS = (0.0, 0.25, -0.25, 0.5, -0.5)
 _KEPT = 16
 """How many inverse kinematics are kept of contacts asked for last, a few MB each: to keep all takes
 half a GB in some searches and saves no time in any of 109."""
+
+_AT_TOOL = np.zeros(3)
+"""Where loads are in the tool frame, but for a few cm."""
 
 _Key = tuple[str | bytes, ...]
 
@@ -364,3 +368,19 @@ class Task:
         if pair is not None:
             self.collided(index, stage, pair, where)
         return pair is not None
+
+    def overloaded(self, index: int, situation: Situation, q: Array) -> bool:
+        """Whether motors of the acting arm are too weak to rest at configurations (m, n) with the
+        body in the hand, and remember it.
+        """
+        action = self.manoeuvres[index]
+        bodies = (action.body, *self.states[index].carried_by(action.body))
+        loads = [Load(action.gripper, body, _AT_TOOL) for body in bodies]
+        for configuration in q:
+            whole = situation.q.copy()
+            whole[self.arms[action.gripper].arm.slice] = configuration
+            faults = overloads(self.scene, whole, loads)
+            if faults:
+                self.record(index, Stage.REACH, faults[0].constraint)
+                return True
+        return False

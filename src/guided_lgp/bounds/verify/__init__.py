@@ -9,12 +9,12 @@ where it holds the box), ``pads <gripper> <box>`` (the fingertips are not on its
 centre of mass of the box and all it carries is not above its support), ``carried <box> <carrier>``
 (it moves relative to what holds or supports it), ``level <box>`` (a held box that carries others is
 tilted), ``clear <link> <body>``, ``apart <link> <link>`` and ``beside <body> <body>`` (two bodies
-overlap). Besides: ``joint limit <joint>``, and along a path ``jump <joint>``, ``velocity <joint>``,
-``acceleration <joint>``, ``effort <joint>`` (more than the motor has), ``fingers <gripper>`` (not
-closed on the box they carry), ``start`` and ``posture <gripper>`` (not where the scene has the arms
-at first, and a goal has one in the end), ``skeleton`` (an action is not applicable),
-``attachments`` (not those of the skeleton), ``samples`` (of impossible shape or order) and ``joint
-names`` (not those of arms and fingers, each once).
+overlap). Besides: ``joint limit <joint>``, ``effort <joint>`` (more than the motor has; at rest in
+keyframes), and along a path ``jump <joint>``, ``velocity <joint>``, ``acceleration <joint>``,
+``fingers <gripper>`` (not closed on the box they carry), ``start`` and ``posture <gripper>`` (not
+where the scene has the arms at first, and a goal has one in the end), ``skeleton`` (an action is
+not applicable), ``attachments`` (not those of the skeleton), ``samples`` (of impossible shape or
+order) and ``joint names`` (not those of arms and fingers, each once).
 """
 
 from guided_lgp.bounds.checks import Violation

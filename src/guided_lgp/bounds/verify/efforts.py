@@ -1,4 +1,4 @@
-"""Torques that the arms' motors exert along a motion, by inverse dynamics."""
+"""Torques that the arms' motors exert at rest and along a motion, by inverse dynamics."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from guided_lgp.bounds.checks import volumes
+from guided_lgp.bounds.checks import Violation, volumes
 from guided_lgp.bounds.results import Array, Attachment
 from guided_lgp.bounds.verify.attachments import carriers, spans
 from guided_lgp.logic import Skeleton
-from guided_lgp.poses import compose, inverse, rotation_matrix
+from guided_lgp.poses import apply, compose, inverse, rotation_matrix
 from guided_lgp.robots.kinematics import JointIndex, fill, joint_index
 from guided_lgp.scene import Scene
 from guided_lgp.scene.world import BOX_DENSITY, initial_poses
@@ -74,6 +74,36 @@ def joint_efforts(scene: Scene, q: Array, times: Array, carried: Iterable[Carrie
     return efforts
 
 
+@dataclass(frozen=True)
+class Load:
+    """A box in a hand, or on one that is."""
+
+    gripper: str
+    box: str
+    centre: Array
+    """(3,) in the tool frame (m)."""
+
+
+def overloads(scene: Scene, q: Array, loads: Iterable[Load]) -> list[Violation]:
+    """Joints whose motor is too weak for the arms to rest at q (n,), in units of its limit.
+
+    Springs that carry the arms leave their motors more than enough for what hands hold at rest.
+    """
+    robot, rows = scene.robot.description, q[None]
+    if robot.balanced:
+        return []
+    efforts = own_weights(scene, rows)
+    for load in loads:
+        weight = BOX_DENSITY * volumes(scene)[load.box] * GRAVITY
+        forces = _in_base(scene, np.array([[0.0, 0.0, weight]]))
+        efforts += _lifting(scene, load.gripper, rows, load.centre, forces)
+    excess = np.abs(efforts[0]) / robot.effort_limits - 1.0
+    return [
+        Violation(f"effort {robot.joint_names[joint]}", float(excess[joint]))
+        for joint in np.flatnonzero(excess > 0)
+    ]
+
+
 def own_weights(scene: Scene, q: Array) -> Array:
     """Torques (T, n) in Nm of the arms' own weight at configurations q (T, n)."""
     import pinocchio
@@ -105,20 +135,29 @@ def _torques(scene: Scene, q: Array, rates: Array, changes: Array) -> Array:
 
 def _load_torques(scene: Scene, q: Array, times: Array, load: Carried, rows: slice) -> Array:
     """Of one box, at some rows: (R, n)."""
-    import pinocchio
-
-    robot, gripper = scene.robot.description, load.span.gripper
-    arm, around = robot.arms[gripper], slice(rows.start - 1, rows.stop + 1)
+    gripper, around = load.span.gripper, slice(rows.start - 1, rows.stop + 1)
     centres = compose(scene.robot.tool_poses(q[around], (gripper,))[gripper], load.grip)[:, :3]
     _, changes = derivatives(centres, times[around])
     mass = BOX_DENSITY * volumes(scene)[load.span.box]
     pull = np.array([0.0, 0.0, GRAVITY])
-    forces = mass * (changes + pull) @ rotation_matrix(scene.robot.base_pose[3:])
-    arms = _arms(scene, weightless=False)
+    forces = _in_base(scene, mass * (changes + pull))
+    return _lifting(scene, gripper, q[rows], load.grip[:3], forces)
+
+
+def _in_base(scene: Scene, vectors: Array) -> Array:
+    """Vectors (..., 3) of the world in the frame of the robot's base."""
+    return np.asarray(vectors @ rotation_matrix(scene.robot.base_pose[3:]))
+
+
+def _lifting(scene: Scene, gripper: str, q: Array, centre: Array, forces: Array) -> Array:
+    """Torques (R, n) of forces (R, 3) on the centre (3,) of a load in a tool frame."""
+    import pinocchio
+
+    arm, arms = scene.robot.description.arms[gripper], _arms(scene, weightless=False)
     frame = arms.model.getFrameId(arm.tool_link)
-    point = compose(arm.tool_in_link, load.grip)[:3]
+    point = apply(arm.tool_in_link, centre)
     jacobians, turned = [], []
-    for row in arms.rows(q[rows]):
+    for row in arms.rows(q):
         jacobian = pinocchio.computeFrameJacobian(
             arms.model, arms.data, row, frame, pinocchio.ReferenceFrame.LOCAL_WORLD_ALIGNED
         )

@@ -1,7 +1,7 @@
 """Verification of keyframes."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from weakref import WeakKeyDictionary
 
@@ -17,7 +17,9 @@ from guided_lgp.bounds.checks import (
 )
 from guided_lgp.bounds.results import Array, Keyframe
 from guided_lgp.bounds.terms import carried
+from guided_lgp.bounds.terms.balanced import whole_stack
 from guided_lgp.bounds.terms.carried import relative
+from guided_lgp.bounds.verify.efforts import Load, overloads
 from guided_lgp.bounds.verify.geometry import (
     NOTHING,
     Stack,
@@ -79,6 +81,7 @@ def _faults(
     reached.stacks = stacks(boxes, support)
     changed = [box for box, stack in reached.stacks.items() if good.get(box) != stack]
     violations += placement_faults(world.scene, boxes, support, changed)
+    violations += _effort_faults(world.scene, reached, held, support)
     world.set(reached.keyframe.q, reached.keyframe.boxes, fingers)
     bodies = body_names(world.scene)
     violations += [
@@ -153,6 +156,21 @@ def joint_limit_faults(robot: Robot, q: Array) -> list[Violation]:
             if not excess[index] <= LIMIT_TOLERANCE
         ]
     return []
+
+
+def _effort_faults(
+    scene: Scene,
+    reached: "_Reached",
+    held: Iterable[tuple[str, str]],
+    support: Mapping[str, str],
+) -> list[Violation]:
+    """Joints whose motor is too weak to rest in a keyframe."""
+    loads = (
+        Load(gripper, name, np.array(relative(reached.boxes[name], reached.tools[gripper])[0]))
+        for box, gripper in held
+        for name in whole_stack(box, support)
+    )
+    return overloads(scene, reached.keyframe.q, loads)
 
 
 class _Reached:
