@@ -1,5 +1,7 @@
 """The program: its commands, in the order of the help, and its entry points."""
 
+import atexit
+import gc
 import sys
 from collections.abc import Sequence
 from typing import Annotated, Any
@@ -92,6 +94,7 @@ def stage_main(stage: str) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run a command."""
+    atexit.register(gc.freeze)  # else cycles are looked for in all that is there, in a sixth second
     run_program(
         lambda words: app(words, standalone_mode=False),
         sys.argv[1:] if arguments is None else arguments,

@@ -10,7 +10,7 @@ import typer
 
 from guided_lgp import __version__
 from guided_lgp.cli.outputs import destinations, named_files
-from guided_lgp.cli.running import complain
+from guided_lgp.cli.running import complain, lasting_imports
 from guided_lgp.cli.terminal import (
     AsJson,
     PlanningTime,
@@ -176,10 +176,11 @@ def plan(
 
     Example: guided-lgp plan scene.json --goal "(on red tray)" --html plan.html --execute
     """
-    from guided_lgp.logic import parse_objective
-    from guided_lgp.params import load_planning
-    from guided_lgp.planning import plan as search
-    from guided_lgp.scene import parse_scene
+    with lasting_imports():
+        from guided_lgp.logic import parse_objective
+        from guided_lgp.params import load_planning
+        from guided_lgp.planning import plan as search
+        from guided_lgp.scene import parse_scene
 
     document = read_scene_or_plan(scene)
     inputs = [scene, params, models, *named_files(document, scene.parent)]

@@ -1,6 +1,7 @@
 """Running a program: errors become one line and an exit code."""
 
 import errno
+import gc
 import logging
 import os
 import select
@@ -91,6 +92,17 @@ def complain(line: str) -> None:
     """Write a line to standard error, if anybody reads it: the exit code says the same."""
     with suppress(BrokenPipeError):
         typer.echo(line, err=True)
+
+
+@contextmanager
+def lasting_imports() -> Iterator[None]:
+    """Import what a command needs: cycles are not looked for in what stays to the end."""
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 @contextmanager

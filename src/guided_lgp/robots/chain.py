@@ -8,6 +8,7 @@ ones, a torso, a linear rail) are part of that geometry, at the values that they
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -104,8 +105,9 @@ class Chain:
         return rotation, position, columns
 
 
-def read_joints(urdf: Path) -> dict[str, Joint]:
-    """The joints of a URDF by the name of their child link.
+@cache
+def read_joints(urdf: Path) -> Mapping[str, Joint]:
+    """The joints of a URDF, whose name is another for another content, by their child link.
 
     Raises:
         InputError: the file cannot be read.

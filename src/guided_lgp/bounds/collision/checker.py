@@ -68,9 +68,8 @@ class CollisionChecker:
         base = pin.XYZQUATToSE3(scene.robot.base_pose)
         self._geometry = pin.GeometryModel()
         self._names: list[str] = []
-        for body, shape in robot_shapes(robot.urdf):
-            placement = base * body.placement if body.parentJoint == 0 else body.placement
-            self._add(body.name[: body.name.rindex("_")], body.parentJoint, placement, shape)
+        for link, joint, pose, shape in robot_shapes(robot.urdf):
+            self._add(link, joint, pin.SE3(pose) if joint else base * pin.SE3(pose), shape)
         for joint in range(1, self._model.njoints):
             if self._model.parents[joint] == 0:
                 self._model.jointPlacements[joint] = base * self._model.jointPlacements[joint]
@@ -116,7 +115,7 @@ class CollisionChecker:
         moving = robot.moving_joints
         at = np.array([self._coordinate(joint) for joint in moving])
         self._turning = np.array(robot.continuous, dtype=int)
-        self._plain = np.setdiff1d(np.arange(len(at)), self._turning)
+        self._plain = np.delete(np.arange(len(at)), self._turning)
         self._plain_at, self._cosine_at = at[self._plain], at[self._turning]
         self._certificate = Certificate(self._model, self._template, self._geometry, moving)
         self._nearest = Nearest(

@@ -6,6 +6,7 @@ the mirror image of another shares its chain: mirrored joint values go in, and `
 the result over at the plane y = 0.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Any
@@ -211,7 +212,7 @@ def kinematics_of(robot: Robot) -> RobotKinematics:
 
 
 def _chain(
-    robot: Robot, arm: Arm, name: str, fixed: tuple[str, ...], joints: dict[str, Joint]
+    robot: Robot, arm: Arm, name: str, fixed: tuple[str, ...], joints: Mapping[str, Joint]
 ) -> Chain:
     return Chain(
         gripper=arm.gripper,
