@@ -25,6 +25,8 @@ from guided_lgp.paths import CASES
 from guided_lgp.policy.relational.inference import load_relational
 from guided_lgp.policy.relational.samples import Examples
 from guided_lgp.policy.tensors import write_tensors
+from guided_lgp.report.case_page import came_out
+from guided_lgp.report.pages import ABOUT_CASES
 
 ROOT = Path(__file__).parents[1]
 PARAMS = load_params(ROOT / "params.yaml")
@@ -226,3 +228,8 @@ def test_the_figures_in_git_follow_from_the_rows_in_git(name: str) -> None:
             *("relational", "relational_best_first"),
         }
         assert written[size]["relational"]["trainings"] == len(PARAMS.cases[name].seeds)
+
+
+def test_the_page_on_cases_follows_from_the_figures_in_git() -> None:
+    figures, shares = (read_json(ROOT / name) for name in (collect.RESULTS, collect.COMPARED))
+    assert came_out(figures, shares) in (ROOT / ABOUT_CASES).read_text(encoding="utf-8")

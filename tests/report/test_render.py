@@ -177,9 +177,15 @@ def test_pages_hold_the_tables_and_the_findings(rendered: Path, tmp_path: Path) 
     assert results.count("**Table I") >= 3
     assert "K = 20: e.10" in results
     assert "crowded rows" not in text
+    about_cases = tmp_path / "clone/docs/cases.md"
+    about_cases.write_text(f"# Cases\n\n{BEGIN}\nold\n{END}\n")
+    write_json(tmp_path / "clone/reports/cases.json", outputs.cases())
     write_json(tmp_path / "clone/reports/cases_compared.json", outputs.cases_compared())
     write_pages(tmp_path / "clone")
     assert "needs 6.5, 6.5 calls" in readme.read_text()
+    assert "| Relational | 60 of 60, 6.5 | 60 of 60, 6.5 |" in about_cases.read_text()
+    assert "0.35 (0.30 to 0.40, A\\*, facts)" in about_cases.read_text()
+    assert "4 boxes: 4 and 10 of 20" in about_cases.read_text()
     readme.write_text("# Title\n")
     with pytest.raises(InputError, match="markers"):
         write_pages(tmp_path / "clone")

@@ -45,7 +45,7 @@ def table(name: str, sizes: Mapping[str, Metrics]) -> Table:
             "verdict against the sequence; failed: sequences that reach the goals and that the "
             "bound refused. Questions about parts of a scene, from which facts and conflicts come, "
             "are calls like any other.",
-            _carried_out(sizes),
+            carried_out(sizes),
         ),
         records=records,
     )
@@ -64,7 +64,8 @@ def _texts(cell: Metrics | None) -> tuple[str, ...]:
     )
 
 
-def _carried_out(sizes: Mapping[str, Metrics]) -> str:
+def carried_out(sizes: Mapping[str, Metrics]) -> str:
+    """How many of the plans have a verified path, and reach their goals under gravity."""
     found = []
     for size, planners in sizes.items():
         for name in ("relational", "relational_best_first"):
@@ -143,6 +144,8 @@ def _verdict(sizes: Mapping[str, Metrics]) -> str:
     if half and more:
         where = f"with {_listed(half)} boxes, and more with {_listed(more)}"
     text = f"The policy needs {amount} half the calls of the best search without one {where}."
+    if unclear := [size for size, ratios in sizes.items() if _spans_one(ratios["with_facts"])]:
+        text += f" With {_listed(unclear)} boxes the interval does not tell who needs fewer."
     if convenient:
         text += (
             " Where many problems share a scene, so that its facts cost nothing, a search that "
@@ -150,6 +153,10 @@ def _verdict(sizes: Mapping[str, Metrics]) -> str:
             "boxes: learning is a convenience there, not a necessity."
         )
     return text
+
+
+def _spans_one(ratio: Metrics) -> bool:
+    return bool(ratio["low"] <= 1 <= ratio["high"])
 
 
 def _apart(sizes: Mapping[str, Metrics], counted: str) -> tuple[list[str], list[str]]:

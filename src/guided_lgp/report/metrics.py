@@ -128,6 +128,7 @@ class CaseFigures(Figures):
     trainings: Annotated[Count, Field(ge=1)]
     problems: Annotated[Count, Field(ge=1)]
     solved: Count
+    solved_within_2k: Count
     solved_min: Count
     calls_mean: Number | None
     calls_limited_mean: Number

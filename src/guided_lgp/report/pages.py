@@ -1,16 +1,26 @@
-"""Results in the pages for readers: ``docs/results.md``, and the findings of the README."""
+"""Results in the pages for readers: ``docs/results.md``, findings in README and ``cases.md``."""
 
 from pathlib import Path
+from typing import Any
+
+from pydantic import TypeAdapter
 
 from guided_lgp.documents import read_text, write_text
 from guided_lgp.errors import InputError
 from guided_lgp.paths import REPORTS
 from guided_lgp.report import paper
+from guided_lgp.report.case_page import came_out
 from guided_lgp.report.cases import headline
 from guided_lgp.report.cells import NONE
 from guided_lgp.report.drawing import save
 from guided_lgp.report.findings import many, pair, tree
-from guided_lgp.report.metrics import COMPARED, Metrics, read_evaluations, read_metrics
+from guided_lgp.report.metrics import (
+    CASES,
+    COMPARED,
+    Metrics,
+    read_evaluations,
+    read_metrics,
+)
 from guided_lgp.report.scalability_figures import solved
 from guided_lgp.report.style import POLICIES
 from guided_lgp.search.planners import BEST, CONTROL, PAPERS, TABLE_1
@@ -18,6 +28,7 @@ from guided_lgp.search.planners import BEST, CONTROL, PAPERS, TABLE_1
 BEGIN = "<!-- findings: written by make repro -->"
 END = "<!-- end of findings -->"
 RESULTS = Path("docs/results.md")
+ABOUT_CASES = Path("docs/cases.md")
 IMAGES = Path("docs/images")
 TABLES = ("winners", "table_1", "table_3_tree_size", "table_3_time", "table_3_details", "training")
 """Files of ``reports/tables`` that the page of results has."""
@@ -38,22 +49,29 @@ Written by `make repro` from `reports/`; the whole report, with figures and 3D r
 
 
 def write_pages(root: Path) -> None:
-    """Write the page of results with its figure, and the findings in ``README.md``.
+    """Write the page of results with its figure, and the findings in the README and about cases.
 
     Args:
         root: the folder of ``dvc.yaml``.
 
     Raises:
-        InputError: a table or metric, or a marker in the README, is missing, or a file cannot be
+        InputError: a table or metric, or a marker in a page, is missing, or a file cannot be
             written.
     """
     shares, metrics, timing = read_evaluations(root)
     (root / IMAGES).mkdir(parents=True, exist_ok=True)
     save(solved(metrics), root / IMAGES, "solved")
     write_text(root / RESULTS, "\n".join([_INTRODUCTION, *_tables(root)]))
-    rows = root / REPORTS / "cases_compared.json"
-    compared = read_metrics(rows, "make cases", COMPARED) if rows.is_file() else {}
+    compared = _of_cases(root, "cases_compared", COMPARED)
     _replace(root / "README.md", findings(metrics, timing, shares, compared))
+    if compared:
+        _replace(root / ABOUT_CASES, came_out(_of_cases(root, "cases", CASES), compared))
+
+
+def _of_cases(root: Path, name: str, shape: TypeAdapter[Any]) -> Metrics:
+    """Figures of the cases; none before ``make cases`` has run."""
+    path = root / REPORTS / f"{name}.json"
+    return read_metrics(path, "make cases", shape) if path.is_file() else {}
 
 
 def _tables(root: Path) -> list[str]:
@@ -67,13 +85,13 @@ def _tables(root: Path) -> list[str]:
     return texts
 
 
-def _replace(readme: Path, block: str) -> None:
+def _replace(page: Path, block: str) -> None:
     """Put a block between the two markers of a page."""
-    before, begin, rest = read_text(readme).partition(BEGIN)
+    before, begin, rest = read_text(page).partition(BEGIN)
     _, end, after = rest.partition(END)
     if not end:
-        raise InputError(str(readme), "has no markers of the findings", f"{BEGIN} and {END}")
-    write_text(readme, f"{before}{begin}\n\n{block}\n{end}{after}")
+        raise InputError(str(page), "has no markers of the findings", f"{BEGIN} and {END}")
+    write_text(page, f"{before}{begin}\n\n{block}\n{end}{after}")
 
 
 def findings(metrics: Metrics, timing: Metrics, shares: Metrics, cases: Metrics) -> str:
