@@ -5,7 +5,15 @@ from scripted import UNIFORM, Scorer, ScriptedBounds
 
 from guided_lgp.domains import load_domain
 from guided_lgp.errors import InputError
-from guided_lgp.logic import Action, Objective, State, parse_objective, parse_skeleton, progress
+from guided_lgp.logic import (
+    Action,
+    Objective,
+    Skeleton,
+    State,
+    parse_objective,
+    parse_skeleton,
+    progress,
+)
 from guided_lgp.params import SearchLimits
 from guided_lgp.scene.model import Scene
 from guided_lgp.search import guided
@@ -132,3 +140,30 @@ def test_a_reattempt_leaves_the_circle(scene: Scene) -> None:
     result = guided.plan(Problem(scene, objective, limits, ScriptedBounds(scene), circles))
     assert result.causes == ("max_depth",)
     assert result.solved
+
+
+def test_what_has_failed_is_doubted_in_other_contexts(scene: Scene) -> None:
+    """The policy does not see that green keeps the hand from red, and would move blue."""
+    likes = {"(grasp pr2L red)": 6.0, "(grasp pr2L green)": 1.0}
+    likes |= {f"(place pr2L {box} tab2)": 4.0 for box in ("red", "green")}
+
+    def score(objective: Objective, state: State, action: Action) -> float:
+        if str(action) == "(grasp pr2L blue)" and state.support_of("blue") == "tab1":
+            return 5.0
+        return likes.get(str(action), -9.0)
+
+    policy = Scorer(score)
+
+    def feasible(skeleton: Skeleton) -> bool:
+        moved = {action.symbols[1] for action in skeleton[:-1]}
+        return skeleton[-1].symbols[1] != "red" or "green" in moved
+
+    limits = SearchLimits(
+        max_depth=8, reattempts=4, max_tree_size=20_000, max_paths=1000, max_sequences=1000
+    )
+    objective = parse_objective(["(on red tab2)"])
+    problem = Problem(scene, objective, limits, ScriptedBounds(scene, coarse=feasible), policy)
+    sure, doubting = guided.plan(problem), guided.plan_with_doubts(problem)
+    assert not sure.solved
+    assert doubting.solved
+    assert doubting.infeasible_calls < sure.infeasible_calls == 5

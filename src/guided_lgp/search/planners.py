@@ -45,6 +45,11 @@ SEARCHES: Mapping[str, Search] = {
         widens=True,
     ),
     "guided": Search("guided:plan", "follow the policy, as in the paper", follows_policy=True),
+    "doubting": Search(
+        "guided:plan_with_doubts",
+        "follow the policy, but doubt what has failed",
+        follows_policy=True,
+    ),
     "best-first": Search(
         "best_first:plan",
         "the policy, but going back to any other action where needed",
@@ -229,7 +234,11 @@ CASE_PLANNERS: Mapping[str, Planner] = {
         Planner(name="facts_tuned", label="Facts, tuned", search="facts-tuned"),
         Planner(name="conflicts", label="Conflicts", search="conflicts"),
         Planner(
-            name="relational", label="Relational", search="guided", policy="full", carried_out=True
+            name="relational",
+            label="Relational",
+            search="doubting",
+            policy="full",
+            carried_out=True,
         ),
         Planner(
             name="relational_best_first",
@@ -244,7 +253,7 @@ CASE_PLANNERS: Mapping[str, Planner] = {
             policy="full",
         ),
         *(
-            Planner(name=f"relational_{name}", label=label, search="guided", policy=name)
+            Planner(name=f"relational_{name}", label=label, search="doubting", policy=name)
             for name, label in (
                 ("no_relative_geometry", "Relational without relative geometry"),
                 ("no_sizes", "Relational without sizes"),
