@@ -137,6 +137,23 @@ def test_a_policy_of_each_kind_is_trained(rows: list[dict[str, Any]], tmp_path: 
     assert SHUFFLED in params.cases["rows"].controls
 
 
+def test_of_several_right_places_surfaces_are_taught(
+    rows: list[dict[str, Any]], tmp_path: Path
+) -> None:
+    labelled = [row | {"configuration": i % 2} for i, row in enumerate(rows)]
+    file = tmp_path / "data" / "rows" / "demonstrations.safetensors"
+    arrays = demonstrate.label_arrays(labelled, 2)
+    write_tensors(file, arrays)
+    taught = train.load_demonstrations(tmp_path, "rows", load_domain()).right
+    surfaces = arrays["positions"].shape[1] - arrays["supports"].shape[1]
+    on_boxes = taught[..., surfaces:].any(axis=(1, 2)) & (arrays["supports"] < 0).any(axis=1)
+    assert (taught <= arrays["right"]).all()
+    assert taught.any(axis=(1, 2)).all()
+    placing = arrays["right"][..., :surfaces].any(axis=(1, 2))
+    assert (arrays["right"] & ~taught)[placing].any()
+    assert not on_boxes[placing].any()
+
+
 def double(number: int) -> int:
     return 2 * number
 

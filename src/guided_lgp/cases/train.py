@@ -22,7 +22,7 @@ from guided_lgp.policy.arrays import BoolArray
 from guided_lgp.policy.relational.encoding import GOAL_HELD, Range, Situations, graphs
 from guided_lgp.policy.relational.heads import heads
 from guided_lgp.policy.relational.model import Model
-from guided_lgp.policy.relational.samples import Examples
+from guided_lgp.policy.relational.samples import Examples, on_surfaces, preferred
 from guided_lgp.policy.relational.training import fit
 from guided_lgp.policy.tensors import Shape, read_arrays, require_range
 
@@ -65,6 +65,9 @@ def run(params: Params, root: Path, name: str, seed: int) -> None:
 def load_demonstrations(root: Path, case: str, domain: Domain) -> Examples:
     """The labelled states of a case.
 
+    Of several right actions, those are taught that do not put a box on another one, if there are
+    such: with three boxes it does no harm, with seven that one may be in the way itself.
+
     Raises:
         InputError: the file is missing or damaged; the message names the stage.
     """
@@ -88,8 +91,8 @@ def load_demonstrations(root: Path, case: str, domain: Domain) -> Examples:
         grippers=sizes["grippers"],
         shapes=arrays["shapes"],
     )
-    configuration = arrays["configuration"]
-    return Examples(situations, arrays["right"], configuration, domain, arrays["wrong"])
+    right = preferred(arrays["right"], on_surfaces(situations))
+    return Examples(situations, right, arrays["configuration"], domain, arrays["wrong"])
 
 
 def train(task: Training) -> None:

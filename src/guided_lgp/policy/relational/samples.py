@@ -87,9 +87,15 @@ def examples(dataset: Dataset) -> Examples:
         encoding.holders,
     )
     for preference in (supports_first(situations), own_side(situations)):
-        preferred = right & preference
-        right = np.where(preferred.any(axis=(1, 2), keepdims=True), preferred, right)
+        right = preferred(right, preference)
     return Examples(situations, right, configuration[first], encoding.signature.domain)
+
+
+def preferred(right: BoolArray, preference: BoolArray) -> BoolArray:
+    """(N, G, T) of the right actions those that are preferred, where there are such."""
+    both = right & preference
+    chosen: BoolArray = np.where(both.any(axis=(1, 2), keepdims=True), both, right)
+    return chosen
 
 
 def _actor_and_target(dataset: Dataset) -> tuple[IntArray, IntArray]:
@@ -144,3 +150,12 @@ def own_side(situations: Situations) -> BoolArray:
     held = graphs(situations, Range.of(situations)).held[..., None]
     towards = situations.positions[:, None, :, 1] * sides(situations.grippers)[:, None]
     return (held >= 0) | (towards > 0)
+
+
+def on_surfaces(situations: Situations) -> BoolArray:
+    """(B, G, T) whether an action does not place what is held on a box."""
+    held = graphs(situations, Range.of(situations)).held[..., None]
+    tables = situations.positions.shape[1]
+    surface = np.arange(tables) < tables - situations.supports.shape[1]
+    allowed: BoolArray = (held < 0) | surface
+    return allowed
