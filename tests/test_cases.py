@@ -56,6 +56,8 @@ ELEVEN = [f"(on b{number} right)" for number in range(1, 12)]
         ("lid_on_pot", ["(on lid post)"], 2),
         # What a hand holds at the start may carry others.
         ("stack_in_hand", ["(on cup right)"], 2),
+        # Two boxes change places: one of them gives way first, to where it does not stay.
+        ("swap", ["(at a left 0.5 0.42 0.65 0)", "(at b left 0.5 0.25 0.65 0)"], 6),
         # The hand opens as far as the box asks, and goes between neighbours.
         ("sorting_10", [*RED, *GREEN], 20),
         # More actions than the paper's limit of depth.

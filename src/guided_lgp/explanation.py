@@ -87,8 +87,15 @@ class ObservedBounds:
     likely fail again, after seconds. A search that has found nothing without it, takes it up.
     """
 
-    def __init__(self, bounds: Bounds) -> None:
-        self._bounds = bounds
+    def __init__(self, bounds: Bounds, placed: frozenset[str] = frozenset()) -> None:
+        """Begin with nothing.
+
+        Args:
+            bounds: of the scene.
+            placed: bodies whose last move goals ask more of than of others before it: where it
+                fails, the body may still be moved once more.
+        """
+        self._bounds, self._placed = bounds, placed
         self._coarse: dict[Skeleton, CoarseResult] = {}
         self._path: dict[Skeleton, PathResult] = {}
         self._stuck: dict[Skeleton, Failure] = {}
@@ -105,9 +112,14 @@ class ObservedBounds:
     def path(self, skeleton: Skeleton) -> PathResult:
         """See :class:`guided_lgp.search.bounds.Bounds`."""
         result = self._path.setdefault(skeleton, self._bounds.path(skeleton))
-        if result.failure is not None:
+        if result.failure is not None and not self._ends(skeleton, result.failure.action):
             self._stuck[skeleton[: result.failure.action + 1]] = result.failure
         return result
+
+    def _ends(self, skeleton: Skeleton, index: int) -> bool:
+        """Whether an action is the last move of a body of which goals ask more then."""
+        later = {name for action in skeleton[index + 1 :] for name in action.symbols}
+        return bool(self._placed.intersection(skeleton[index].symbols) - later)
 
     def take_up(self) -> bool:
         """Put nothing off that has been; whether there was something."""

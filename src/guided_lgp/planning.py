@@ -207,7 +207,7 @@ def plan(
         scene,
         goals,
         _limits(params.compare_scalability, scene, goals, prefix, max_nodes),
-        ObservedBounds(scene_bounds),
+        ObservedBounds(scene_bounds, scene_bounds.placed),
         followed,
         parts=scene_bounds,
         misplaced=misplaced,
@@ -273,7 +273,7 @@ class _Attempts:
         self.last = replace(
             problem,
             scene=scene,
-            bounds=ObservedBounds(bounds),
+            bounds=ObservedBounds(bounds, bounds.placed),
             parts=bounds,
             policy=problem.policy if knows else Uniform(),
         )
@@ -285,7 +285,7 @@ class _Attempts:
         self._starts += _observed(last).starts
         more = params.model_copy(update={"coarse_restarts": PATIENCE * params.coarse_restarts})
         bounds = self._bounds_of(last.scene, more)
-        observed = ObservedBounds(bounds)
+        observed = ObservedBounds(bounds, bounds.placed)
         self.last = replace(last, bounds=observed, parts=bounds, widened=lambda: None)
         return self.last
 

@@ -66,6 +66,7 @@ def test_generated_scenes_are_good(setup: str) -> None:
         ({"boxes__0__position": [0.5, 0.3, 0.62]}, r"boxes\.0 \(red\)\.position: .* sunk 0.030 m"),
         ({"boxes__0__position": [0.5, 0.1, 0.65]}, "red is 0.030 m beside tab1"),
         ({"boxes__0__on": "tab2"}, "red is 0.430 m beside tab2"),
+        ({"boxes__0__size": [4.5, 4.5, 4.5]}, r"sunk 2.200 m into tab1 .*; is its size in m\?"),
         ({"boxes__0__on": "green", "boxes__1__on": "red"}, "in a circle"),
         ({"robot__torso": 0.32}, r"robot\.torso: 0.32 m is out of range"),
         ({"tables__1__position": [0.54, 0.1, 0.6]}, "tab1 and tab2 overlap"),
@@ -93,7 +94,7 @@ def test_fault_is_named(changes: dict[str, Any], fault: str) -> None:
         ({"robot__tors": 0.4}, r"robot: unknown field 'tors' .did you mean 'torso'\?"),
         ({"boxes__0__name": "red box"}, r"boxes\.0\.name: the name 'red box' has other"),
         ({"boxes__0__name": "l_gripper_palm_link"}, "is that of a part of the robot"),
-        ({"boxes__0__on": "pr2"}, "'red' stands on unknown table 'pr2'"),
+        ({"boxes__0__on": "pr2"}, r"'red' stands on unknown table 'pr2' \(.*tab1"),
     ],
 )
 def test_a_number_that_is_none_or_too_small_is_refused(changes: dict[str, Any], fault: str) -> None:
@@ -114,6 +115,16 @@ def test_what_no_goal_needs_may_be_of_any_size_and_anywhere() -> None:
     validate_scene(scene(boxes__0__size=[0.15, 0.07, 0.001], boxes__0__position=[0.5, 0.3, 0.6005]))
     validate_scene(scene(tables__1__position=[1.8, -0.33, 0.6]))
     validate_scene(scene(boxes__0__position=[0.5, 0.131, 0.65]))
+
+
+def test_a_robot_may_stand_on_a_table() -> None:
+    table = {"name": "table", "position": [0.3, 0.0, 0.0], "half_extents": [0.6, 0.6]}
+    box = {"name": "red", "size": [0.05, 0.05, 0.1], "position": [0.5, 0, 0.05], "on": "table"}
+    on_it = {"robot": {"model": "panda"}, "tables": [table], "boxes": [box]}
+    validate_scene(parse_scene(on_it, "mine.json"))
+    table["position"], box["position"] = [0.3, 0.0, 0.01], [0.5, 0, 0.06]
+    with pytest.raises(InputError, match=r"table is 0\.011 m inside the robot"):
+        validate_scene(parse_scene(on_it, "mine.json"))
 
 
 def test_names_are_those_that_goals_can_carry() -> None:

@@ -3,12 +3,14 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from guided_lgp.bounds.deadline import Deadline, OutOfTimeError
 from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.logic import parse_objective, parse_skeleton
 from guided_lgp.params import load_planning
+from guided_lgp.poses import pose, rotation_matrix
 from guided_lgp.scene import Box, Scene, load_scene, parse_scene
 from guided_lgp.scene.bodies import Obstacle
 from guided_lgp.search.facts import TaskFacts
@@ -55,6 +57,37 @@ def test_a_box_too_wide_is_told_before_a_search() -> None:
     assert finding.kind == "width"
     assert finding.text == "red is too wide for the fingers: 0.120 m at its narrowest side"
     assert facts(wide, "(on green tab1)").before_search() is None, "nobody wants red"
+
+
+def test_what_fingertips_have_no_room_on() -> None:
+    """Too flat a coin; a mesh with no parallel faces where its frame would have them."""
+    flat = resized(NEAR, red=(0.03, 0.03, 0.005))
+    assert found(facts(flat, "(on red tab2)").before_search()).text == (
+        "red is too small for the fingers: they need 0.006 m of its sides either way"
+    )
+    plate = resized(NEAR, red=(0.14, 0.005, 0.12))
+    assert facts(plate, "(on red tab2)").before_search() is None, "across its thickness"
+    angles = np.arange(8) * np.pi / 4
+    ring = np.stack([0.03 * np.cos(angles), 0.03 * np.sin(angles)], axis=1)
+    prism = [[x, y, z] for x, y in ring.tolist() for z in (0.0, 0.1)]
+    bodies = NEAR.model_dump(mode="json")
+    bodies["boxes"][0] |= {"shape": "mesh", "vertices": prism, "position": [0.5, 0.25, 0.6]}
+    finding = found(facts(parse_scene(bodies, "mine"), "(on red tab2)").before_search())
+    assert finding.text.startswith("red has no two parallel faces, across its x or y, ")
+    turn = rotation_matrix(pose(np.zeros(3), np.pi / 8)[3:])
+    bodies["boxes"][0]["vertices"] = (np.array(prism) @ turn).tolist()
+    assert facts(parse_scene(bodies, "mine"), "(on red tab2)").before_search() is None
+
+
+def test_boxes_too_tight_together() -> None:
+    """No proof by discs, yet no arm puts both there."""
+    tray = NEAR.tables[1].model_copy(update={"half_extents": (0.03, 0.03)})
+    tight = NEAR.model_copy(update={"tables": (NEAR.tables[0], tray)})
+    goals = [f"(on {name} tab2)" for name in ("red", "blue")]
+    assert facts(tight, *goals).before_search() is None
+    finding = found(facts(tight, *goals).after_search())
+    assert finding.kind == "room"
+    assert finding.text.startswith("no arm puts blue and red on tab2 together, ")
 
 
 def test_no_room_for_two() -> None:

@@ -59,6 +59,11 @@ class SceneBounds:
         self._path: dict[Skeleton, PathResult] = {}
 
     @property
+    def placed(self) -> frozenset[str]:
+        """The bodies whose place at the end goals ask for."""
+        return frozenset(term.symbols[0] for term in self._goals.final)
+
+    @property
     def facts(self) -> Facts:
         """What single arms cannot do in the scene."""
         return self._coarse_bound.facts

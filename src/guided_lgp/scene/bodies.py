@@ -32,8 +32,8 @@ def _no_more_than(most: float, hint: str) -> WrapValidator:
     return WrapValidator(check)
 
 
-_METRES = "lengths are in m; is this in mm or cm?"
-_RADIANS = "angles are in rad; are these degrees?"
+METRES = "lengths are in m; is this in mm or cm?"
+RADIANS = "angles are in rad; are these degrees?"
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
 _COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
 
@@ -75,17 +75,17 @@ Name = Annotated[
 Coordinate = Annotated[
     float,
     Field(strict=True, ge=-10, le=10, allow_inf_nan=False),
-    _no_more_than(10, _METRES),
+    _no_more_than(10, METRES),
 ]
 Angle = Annotated[
     float,
     Field(strict=True, ge=-2 * math.pi, le=2 * math.pi, allow_inf_nan=False),
-    _no_more_than(2 * math.pi, _RADIANS),
+    _no_more_than(2 * math.pi, RADIANS),
 ]
 Length = Annotated[
     float,
     Field(strict=True, ge=0.001, le=5, allow_inf_nan=False),
-    _no_more_than(5, _METRES),
+    _no_more_than(5, METRES),
 ]
 Point = tuple[Coordinate, Coordinate, Coordinate]
 Component = Annotated[float, Field(strict=True, ge=-1.001, le=1.001, allow_inf_nan=False)]

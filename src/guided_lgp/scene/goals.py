@@ -1,18 +1,21 @@
 """Goals that say more than symbols, read against a scene."""
 
+import math
 from collections.abc import Iterator, Mapping
 
 import numpy as np
 
 from guided_lgp.errors import InputError
 from guided_lgp.logic import Goal, Objective
-from guided_lgp.scene.bodies import Box, Table
+from guided_lgp.scene.bodies import METRES, RADIANS, Box, Table
 from guided_lgp.scene.footprints import footprint, gap, inset
 from guided_lgp.scene.model import Scene
 from guided_lgp.scene.tolerances import FLOAT
 
-_REACH = 100.0
-"""Largest number (m or rad) that a goal may give."""
+_MOST = {"x": 10.0, "y": 10.0, "z": 10.0, "yaw": 2 * math.pi, "turn": math.pi}
+"""Largest numbers of poses (m or rad); what is larger is suspected to be in another unit."""
+_LARGEST = 100.0
+"""Of every other number that a goal may give (m or rad)."""
 
 
 def complete_objective(objective: Objective, scene: Scene) -> Objective:
@@ -79,6 +82,7 @@ def _with_support(goal: Goal, place: int, scene: Scene) -> Goal:
         symbols = (*goal.symbols[:place], support.name, *goal.symbols[place:])
         whole = Goal(goal.kind, symbols)
         (term,) = scene.symbols.domain.final_terms(whole)
+        _check_numbers(goal, term.options)
         if support.name != body.name and _stands(body, support, term.options):
             return whole
     heights = ", ".join(f"z = {z:.3f} on {name}" for name, z in _heights(body, scene))
@@ -120,8 +124,11 @@ def _check_postures(objective: Objective, scene: Scene) -> None:
 
 def _check_numbers(goal: Goal, numbers: Mapping[str, str | float]) -> None:
     for name, value in numbers.items():
-        if abs(float(value)) > _REACH:
-            raise InputError(f"goal {goal}", f"{name} is {value}", f"up to {_REACH:g} m or rad")
+        if abs(float(value)) > _MOST.get(name, math.inf):
+            hint = RADIANS if name in ("yaw", "turn") else METRES
+            raise InputError(f"goal {goal}", f"{name} is {value}: {hint}")
+        if abs(float(value)) > _LARGEST:
+            raise InputError(f"goal {goal}", f"{name} is {value}", f"up to {_LARGEST:g} m or rad")
         if name in ("tolerance", "turn") and float(value) <= 0:
             raise InputError(f"goal {goal}", f"{name} is {value}", "more than 0")
     for axis in ("x", "y"):

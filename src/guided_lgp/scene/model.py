@@ -269,7 +269,8 @@ class Scene(Document):
             if box.name in self.held:
                 continue
             if box.on not in supports or box.on == box.name:
-                raise ValueError(f"box {box.name!r} stands on unknown table {box.on!r}")
+                known = ", ".join(sorted(supports - {box.name}))
+                raise ValueError(f"box {box.name!r} stands on unknown table {box.on!r} ({known})")
             if "position" not in box.model_fields_set:
                 raise ValueError(f"box {box.name!r} has no position")
         return self

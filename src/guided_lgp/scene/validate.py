@@ -10,8 +10,11 @@ from guided_lgp.poses import rotation_matrix, yaw_of
 from guided_lgp.scene.bodies import TABLE_THICKNESS, Box, Table
 from guided_lgp.scene.footprints import footprint, gap, inset, seat
 from guided_lgp.scene.model import Scene
-from guided_lgp.scene.tolerances import FLOAT, LEVEL_ANGLE, OVERLAP
+from guided_lgp.scene.tolerances import FLOAT, LEVEL_ANGLE, MARGIN, OVERLAP
 from guided_lgp.scene.world import at_side, initial_poses, poses_at_side, world_of
+
+_HUGE = 1.5
+"""Of a box (m) that stands nowhere: its size may be in another unit."""
 
 
 def validate_scene(scene: Scene, where: str = "scene") -> None:
@@ -66,7 +69,7 @@ def _validate_robots_place(scene: Scene, where: str) -> None:
     world = world_of(scene)
     for link, body in product(world.fixed_links, (*scene.supports, *scene.obstacles)):
         depth = -world.distance(link, body.name, 0.0)
-        if depth > OVERLAP:
+        if depth > MARGIN:  # it may stand on one, and hulls are wider than the meshes in them
             field = {Table: "tables", Box: "boxes"}.get(type(body), "obstacles")
             fault = f"{body.name} is {depth:.3f} m inside the robot ({link})"
             raise InputError(f"{where}: {field}", fault)
@@ -93,6 +96,8 @@ def _validate_height(scene: Scene, box: Box, where: str) -> None:
     if abs(height) > FLOAT:
         fault = f"floats {height:.3f} m above" if height > 0 else f"is sunk {-height:.3f} m into"
         accepted = f"z = {top + box.size[2] / 2:.4f} m"
+        if max(box.size) > _HUGE:
+            accepted += "; is its size in m?"
         raise InputError(f"{where}.position", f"the box {fault} {box.on}", accepted)
 
 

@@ -7,8 +7,7 @@ coarse bound about small parts of the scene.
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from functools import cached_property
-
-import numpy as np
+from itertools import combinations
 
 from guided_lgp.bounds.coarse.pairs import Pairs
 from guided_lgp.bounds.coarse.parts import Boxes, stacked_with
@@ -29,19 +28,18 @@ from guided_lgp.logic.domain import GroundInstruction
 from guided_lgp.logic.grounding import ground_instructions
 from guided_lgp.logic.objectives import parents_wanted_by
 from guided_lgp.robots import Robot
-from guided_lgp.scene.bodies import Body, Box, Table
-from guided_lgp.scene.footprints import footprint, gap, inner_radius, inset, seat
+from guided_lgp.scene.bodies import Box, Table
+from guided_lgp.scene.footprints import footprint, gap
 from guided_lgp.scene.grasps import is_held_flat
-from guided_lgp.scene.tolerances import MARGIN
 from guided_lgp.search.conflicts import Conflicts
 from guided_lgp.search.finding import Finding
 from guided_lgp.search.lengths import too_far
+from guided_lgp.search.room import cover, crowded, is_wide_for, untouchable
 from guided_lgp.search.surroundings import barriers
+from guided_lgp.search.ways import ways_onto
 
 _FINGERS = 0.03
 """Gap (m) between boxes into which no finger fits."""
-_ROUNDING = 1e-6
-"""By how much (m) numbers of a scene that should be the same may differ."""
 
 
 class TaskFacts:
@@ -96,7 +94,9 @@ class TaskFacts:
         names = " and ".join(name for name in self._boxes if name in found.boxes)
         actions = format_skeleton(found.actions)
         text = f"{actions} cannot be done, even with {names} alone in the scene"
-        return Finding("part", text, f"move {names} or the robot, or take another way")
+        several = len(found.boxes) > 1
+        what = "space between them" if several else f"move {names} or the robot"
+        return Finding("part", text, f"{what}, or take another way")
 
     # before
 
@@ -108,7 +108,9 @@ class TaskFacts:
                 yield self._out_of_reach(" and ".join(sorted(parents)))
             yield from self._too_low(body, parents)
         for support in self._symbols.tables:
-            yield from self._crowded(support)
+            boxes = [self._boxes[name] for name in self._wanted_on(support)]
+            spare = len(self._boxes) - len(boxes) - (support in self._boxes)
+            yield from crowded(self._body(support), boxes, counterweights=spare > 0)
 
     def _moves(self) -> Iterator[tuple[str, frozenset[str]]]:
         """The bodies that goals want elsewhere, and the parents that they leave to them."""
@@ -121,8 +123,7 @@ class TaskFacts:
 
     def _stuck(self, body: str) -> Iterator[Finding]:
         """Why no arm can move a body from the furniture that it stands on."""
-        narrowest = min(self._boxes[body].grasp_widths)
-        widest = max(arm.fingers.grasp_width for arm in self._robot.arms.values())
+        narrowest, widest = min(self._boxes[body].grasp_widths), self._widest
         flat = any(
             is_held_flat(self._boxes[body], self.scene.bodies, arm.fingers.grasp_width)
             for arm in self._robot.arms.values()
@@ -133,6 +134,8 @@ class TaskFacts:
                 f"{body} is too wide for the fingers: {narrowest:.3f} m at its narrowest side",
                 f"a side of at most {widest:.3f} m",
             )
+        else:
+            yield from untouchable(self._boxes[body], widest)
         takings = self._takings(body)
         if takings and all(map(self._cannot_take, takings)):
             yield self._out_of_reach(body)
@@ -171,60 +174,18 @@ class TaskFacts:
         """
         box = self._boxes[body]
         supports = {one.name: one for one in self.scene.supports if one.name in parents}
-        covers = {name: self._cover(support, box) for name, support in supports.items()}
+        covers = {name: cover(self.scene, one, box) for name, one in supports.items()}
         if len(supports) < len(parents):
             return
-        for name, cover in covers.items():
-            if cover is None:
+        for name, above in covers.items():
+            if above is None:
                 return
-            room = cover.placement[2] - cover.convex.half[2] - supports[name].top[2]
+            room = above.placement[2] - above.convex.half[2] - supports[name].top[2]
             yield Finding(
                 "room",
-                f"no room on {name} for {body}: it is {box.size[2]:.3f} m high, and {cover.name} "
+                f"no room on {name} for {body}: it is {box.size[2]:.3f} m high, and {above.name} "
                 f"covers all of {name} {room:.3f} m above it",
-                f"a higher {cover.name}, or a lower {body}",
-            )
-
-    def _cover(self, support: Table | Box, box: Box) -> Body | None:
-        """What is above all of a support, but not as high above it as a box is high."""
-        top, level = support.top[2], (o for o in self.scene.obstacles if o.quaternion is None)
-        for other in (*self.scene.supports, *level):
-            bottom = other.placement[2] - other.convex.half[2]
-            low = top < bottom < top + box.size[2] - MARGIN
-            if low and inset(seat(other), seat(support)).min() >= -_ROUNDING:
-                return other
-        return None
-
-    def _crowded(self, support: str) -> Iterator[Finding]:
-        """Boxes of which goals want too many on one support, however they are turned.
-
-        Around its middle every box has a disc to itself, and the middle is above the support, but
-        for a counterweight, which shifts it within the box.
-        """
-        boxes = [self._boxes[name] for name in self._wanted_on(support)]
-        spare = len(self._boxes) - len(boxes) - (support in self._boxes)
-        half = np.array(self._rest(support)) + (spare > 0) * _longest(boxes)
-        for i, one in enumerate(boxes):
-            for other in boxes[:i]:
-                need = inner_radius(one) + inner_radius(other) - MARGIN
-                most = 2 * float(np.hypot(*half))
-                if need > most:
-                    yield Finding(
-                        "room",
-                        f"no room on {support} for {other.name} and {one.name}: their middles "
-                        f"would be {need:.3f} m apart at least, and can be {most:.3f} m at most",
-                        "a larger support, or another one for one of them",
-                    )
-        covered = sum(4 * box.convex.half[0] * box.convex.half[1] for box in boxes)
-        beyond = half + _longest(boxes)
-        free = 4 * float(np.prod(beyond))
-        if len(boxes) > 1 and all(box.shape == "box" for box in boxes) and covered > free:
-            names = ", ".join(box.name for box in boxes)
-            yield Finding(
-                "room",
-                f"no room on {support} for {names}: they cover {covered:.3f} m², and no more than "
-                f"{free:.3f} m² is above and around it",
-                "a larger support, or another one for some of them",
+                f"a higher {above.name}, or a lower {body}",
             )
 
     def _wanted_on(self, support: str) -> list[str]:
@@ -233,9 +194,9 @@ class TaskFacts:
         found = {body for one in wanted for body, parents in one.items() if parents == {support}}
         return sorted(found)
 
-    def _rest(self, support: str) -> tuple[float, float]:
+    def _body(self, support: str) -> Table | Box:
         bodies = {body.name: body for body in (*self.scene.supports, *self.scene.movable)}
-        return bodies[support].convex.rest
+        return bodies[support]
 
     # after
 
@@ -248,13 +209,18 @@ class TaskFacts:
         for body, parents in moves:
             if parents <= set(self._symbols.surfaces):
                 yield from self._no_way(body, parents)
+        for support in self._symbols.tables:
+            for one, other in combinations(self._wanted_on(support), 2):
+                yield from self._too_tight(one, other, support)
 
     def _kept_from(self, body: str) -> Finding:
         """Why no arm takes a body that is alone with what stands still."""
         fixed = barriers(body, self._takings(body), self.scene, self._deadline)
         if not fixed:
             text = f"{self._every_arm} fail to grasp {body} there, {self._even_alone(body)}"
-            return Finding("reach", text, f"move {body} or the robot, or a smaller {body}")
+            flat = min(self._boxes[body].grasp_widths) > self._widest
+            what = "let it jut out farther" if flat else f"a smaller {body}"
+            return Finding("reach", text, f"move {body} or the robot, or {what}")
         several = ", ".join(fixed)
         text = f"{several} around {body}: {self._every_arm} fail to grasp it, even as the only box"
         return Finding("blocked", text, f"space between {body} and {several}")
@@ -265,7 +231,7 @@ class TaskFacts:
         Of a body in a hand, that one.
         """
         held = self._held(body)
-        return tuple(gripper for gripper, taking, _ in held if not taking or self._alone(taking))
+        return tuple(gripper for gripper, taking, _ in held if not taking or self._done(taking))
 
     def reachable_by(self, body: str, support: str) -> tuple[str, ...]:
         """The grippers that can take a body and put it on a support, alone with its stack."""
@@ -274,7 +240,7 @@ class TaskFacts:
             for action in applicable_actions(after, self._symbols):
                 one = self._symbols.domain.bind(action)
                 if (one.body, one.parent, one.actor) == (body, support, gripper):
-                    found += [gripper] if self._alone((*taking, action)) else []
+                    found += [gripper] if self._done((*taking, action)) else []
         return tuple(found)
 
     def _held(self, body: str) -> Iterator[tuple[str, Skeleton, State]]:
@@ -299,6 +265,24 @@ class TaskFacts:
             f"{self._even_alone(body)}",
             f"furniture between, which both arms reach{takes}; or move {names} or the robot",
         )
+
+    def _too_tight(self, one: str, other: str, support: str) -> Iterator[Finding]:
+        """Two boxes that no arm puts onto a support together, where it is not much wider."""
+        wide = is_wide_for(self._body(support), self._boxes[one], self._boxes[other])
+        ways = ways_onto(support, {one, other}, self._state, self._symbols)
+        if not wide and not any(map(self._done, ways)):
+            text = f"no arm puts {one} and {other} on {support} together, even with nothing else"
+            yield Finding("room", f"{text} there", f"a larger {support}, or a smaller {one}")
+
+    def _done(self, skeleton: Skeleton) -> bool:
+        """Whether a sequence can be done with what it moves alone in the scene."""
+        bodies = {self._symbols.domain.bind(action).body for action in skeleton}
+        boxes = Boxes().union(*(stacked_with(skeleton, self.scene, body) for body in bodies))
+        return self._feasible(boxes, skeleton)
+
+    def _feasible(self, boxes: Boxes, skeleton: Skeleton) -> bool:
+        prefixes = (skeleton[:length] for length in range(1, len(skeleton) + 1))
+        return all(self._bounds.part(boxes, prefix).feasible for prefix in prefixes)
 
     def _even_alone(self, body: str) -> str:
         """What is left in the scene where a body is looked at, in words."""
@@ -365,15 +349,14 @@ class TaskFacts:
         loaded = self.scene.loaded.items()
         return replace(self._state, held=tuple(h for h in self._state.held if h in loaded))
 
-    def _alone(self, skeleton: tuple[Action, ...]) -> bool:
-        body = self._symbols.domain.bind(skeleton[-1]).body
-        boxes = stacked_with(skeleton, self.scene, body)
-        prefixes = (skeleton[:length] for length in range(1, len(skeleton) + 1))
-        return all(self._bounds.part(boxes, prefix).feasible for prefix in prefixes)
-
     @cached_property
     def _pairs(self) -> Pairs:
         return Pairs(self.scene, self._bounds.coarse, self._bounds.part)
+
+    @property
+    def _widest(self) -> float:
+        """The widest side (m) that one of the hands can take."""
+        return max(arm.fingers.grasp_width for arm in self._robot.arms.values())
 
     @property
     def _robot(self) -> Robot:
@@ -383,8 +366,3 @@ class TaskFacts:
     def _every_arm(self) -> str:
         count = len(self._symbols.grippers)
         return {1: "the arm", 2: "both arms"}.get(count, f"all {count} arms")
-
-
-def _longest(boxes: Iterable[Box]) -> float:
-    """How far (m) a corner of one of some boxes is from its middle at most."""
-    return max((float(np.hypot(*box.convex.half[:2])) for box in boxes), default=0.0)

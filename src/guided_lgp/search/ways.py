@@ -1,11 +1,20 @@
 """Where a body can get by what single arms can do, all other bodies aside."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
+from itertools import permutations
 
 from guided_lgp.bounds.deadline import NEVER, Deadline
 from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.domains import extensions
-from guided_lgp.logic import Objective, Skeleton, unsatisfied
+from guided_lgp.logic import (
+    Objective,
+    Skeleton,
+    State,
+    Symbols,
+    applicable_actions,
+    successor,
+    unsatisfied,
+)
 from guided_lgp.logic.grounding import ground_instructions
 from guided_lgp.logic.objectives import may_leave, parents_wanted_by
 from guided_lgp.params import BoundsParams
@@ -82,3 +91,31 @@ def _alone(scene: Scene, body: str) -> Scene:
         below.append(support)
     boxes = tuple(box for box in scene.boxes if box.fixed or box.name in below)
     return scene.model_copy(update={"boxes": boxes})
+
+
+def ways_onto(
+    support: str, bodies: Collection[str], state: State, symbols: Symbols
+) -> Iterator[Skeleton]:
+    """Ways to bring bodies onto a support one after the other, those that are there aside."""
+    missing = sorted(set(bodies) - set(state.standing_on(support)))
+    for order in permutations(missing):
+        found: list[tuple[Skeleton, State]] = [((), state)]
+        for body in order:
+            found = [
+                longer
+                for way, now in found
+                for longer in _brought(body, support, way, now, symbols)
+            ]
+        yield from (way for way, _ in found)
+
+
+def _brought(
+    body: str, support: str, way: Skeleton, state: State, symbols: Symbols
+) -> Iterator[tuple[Skeleton, State]]:
+    """A way, longer by the actions that bring a body onto a support."""
+    for action in applicable_actions(state, symbols):
+        one, after = symbols.domain.bind(action), successor(state, action)
+        if one.body == body and one.parent == support:
+            yield (*way, action), after
+        elif one.body == body and one.into_hand and state.holder(body) is None:
+            yield from _brought(body, support, (*way, action), after, symbols)

@@ -75,6 +75,7 @@ def _grips(body: Convex, palm_front: float, widest: float) -> dict[float, tuple[
         closing = np.eye(3)[across]
         third = np.cross(approach, closing)
         half, touched = np.array(body.half), np.array(body.side(across))
+        touched[across] = np.inf
         if min(touched) <= INSET:
             continue
         reaches = _reaches(half, touched - INSET, palm_front, approach, shift * third)
