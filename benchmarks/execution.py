@@ -16,23 +16,24 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import chain
 from pathlib import Path
-from statistics import fmean, median
+from statistics import fmean
 from typing import Any
 
 import numpy as np
 
+import duration
 from execution_page import PARTS, page
 from guided_lgp import parallel, plan
-from guided_lgp.bounds.coordination import Coordinator
+from guided_lgp.bounds.deadline import NEVER
 from guided_lgp.bounds.execution import Conditions, execute
 from guided_lgp.bounds.execution.conditions import AS_PLANNED
 from guided_lgp.bounds.results import Array
-from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.bounds.verify.attachments import switches_of
 from guided_lgp.bounds.verify.joints import rows_outside_limits
 from guided_lgp.clearance import clearance_of
 from guided_lgp.documents import read_json, write_json
 from guided_lgp.experiments.problems import tower
+from guided_lgp.explanation import users_bounds
 from guided_lgp.logic import Skeleton, State, applicable_actions, successor
 from guided_lgp.params import load_params
 from guided_lgp.paths import METRICS, PARAMS
@@ -58,34 +59,21 @@ AWAY = pose((5.0, 0.0, -1.0))
 """Where nobody sees a box any more."""
 KINDS = ("moved", "dropped", "taken away")
 NO_PLAN: dict[str, Any] = {"succeeded": False, "fault": "no plan"}
-HANDS = {"both_arms": 2, "one_arm": 1}
-"""How many arms act."""
 LIMITS = ("joint limit", "velocity", "acceleration", "jerk", "effort")
 
 
-@dataclass(frozen=True)
-class Planned:
-    """A random plan as shipped."""
-
-    course: Course
-    in_turn_s: float
-    """How long the same actions take one after the other, with all ways home."""
-
-
-def planned(length: int, number: int, wanted: Callable[[Scene, Skeleton], bool]) -> Planned | None:
+def planned(length: int, number: int, wanted: Callable[[Scene, Skeleton], bool]) -> Course | None:
     """A random feasible sequence of setup a, planned; the same for everyone."""
     (scene,) = generate("a", 1, SEED + number, f"execution-{number:03d}").scenes
     rng = np.random.default_rng([SEED, length, number])
-    bounds = SceneBounds(scene, load_params(ROOT / PARAMS).bounds, firm=True)
+    bounds = users_bounds(scene, load_params(ROOT / PARAMS).bounds, NEVER, (), coordinate=True)
     for _ in range(DRAWS):
         skeleton = _drawn(scene, length, rng)
         if wanted(scene, skeleton) and bounds.coarse(skeleton).feasible:
-            in_turn = bounds.path(skeleton)
-            path = Coordinator(scene).shorten(in_turn) if in_turn.feasible else in_turn
-            if path.trajectory is not None and in_turn.trajectory is not None:
+            path = bounds.path(skeleton)
+            if path.trajectory is not None:
                 goals = goals_after(scene.state, skeleton)
-                shipped = Course(scene, goals, path.skeleton, path.trajectory)
-                return Planned(shipped, float(in_turn.trajectory.times[-1]))
+                return Course(scene, goals, path.skeleton, path.trajectory)
     return None
 
 
@@ -135,8 +123,8 @@ class Task:
 
 def carried_out(task: Task) -> list[dict[str, Any]]:
     """What becomes of a random plan, under each of the conditions; empty if there is none."""
-    drawn = planned(task.length, task.number, task.wanted)
-    return [] if drawn is None else [_outcome(drawn.course, c) for c in task.conditions]
+    found = planned(task.length, task.number, task.wanted)
+    return [] if found is None else [_outcome(found, c) for c in task.conditions]
 
 
 def _outcome(found: Course, conditions: Conditions) -> dict[str, Any]:
@@ -153,10 +141,9 @@ def _outcome(found: Course, conditions: Conditions) -> dict[str, Any]:
 
 def shipped(task: Task) -> dict[str, Any] | None:
     """What a random plan keeps to, and what becomes of it."""
-    drawn = planned(task.length, task.number, task.wanted)
-    if drawn is None:
+    found = planned(task.length, task.number, task.wanted)
+    if found is None:
         return None
-    found = drawn.course
     motion = (found.scene, found.skeleton, found.trajectory)
     q, times = _moving(found), found.trajectory.times
     rows = switches_of(*motion)
@@ -165,8 +152,6 @@ def shipped(task: Task) -> dict[str, Any] | None:
         "rows_outside_limits": rows_outside_limits(found.scene, found.skeleton, rows, q, times),
         "waiting_s": waiting(found, q),
         "duration_s": float(times[-1]),
-        "duration_ratio": float(times[-1]) / drawn.in_turn_s,
-        "hands": len({action.symbols[0] for action in found.skeleton}),
         "clearance_mm": round(1000 * clearance_of(*motion).distance, 2),
     }
 
@@ -214,12 +199,12 @@ def disturbed(number: int) -> dict[str, Any] | None:
     if drawn is None:
         return None
     disturbance = Disturbance(KINDS[number % len(KINDS)], np.random.default_rng([SEED, number]))
-    followed = follow(drawn.course, disturb=disturbance, timeout=60)
+    followed = follow(drawn, disturb=disturbance, timeout=60)
     if not disturbance.done:
         return None
     report = followed.report
     return {
-        "scene": drawn.course.scene.name,
+        "scene": drawn.scene.name,
         "kind": disturbance.kind,
         "survived": report.success,
         "succeeded": report.success or bool(report.fault),
@@ -273,16 +258,9 @@ def plans(count: int) -> dict[str, Any]:
     return counted(rows) | {
         "rows_outside_limits": sum(kinds.values()),
         "rows_outside_by_kind": kinds,
-        "duration_ratio": {name: _ratios(rows, hands) for name, hands in HANDS.items()},
         "waiting_share": fmean(row["waiting_s"] / row["duration_s"] for row in rows),
         "smallest_clearance_mm": min(row["clearance_mm"] for row in rows),
     }
-
-
-def _ratios(rows: list[dict[str, Any]], hands: int) -> dict[str, float] | None:
-    """Of the durations of plans with so many hands and those of the same actions in turn."""
-    ratios = [row["duration_ratio"] for row in rows if row["hands"] == hands]
-    return {"median": median(ratios), "worst": max(ratios)} if ratios else None
 
 
 def friction(count: int) -> dict[str, Any]:
@@ -332,6 +310,11 @@ def disturbances(count: int) -> dict[str, Any]:
     return {"disturbed": counted(rows) | {"survived": sum(row["survived"] for row in rows)}}
 
 
+def durations(count: int) -> dict[str, Any]:
+    """How long plans take, as a share of those of the version that all are measured against."""
+    return {"duration_ratio": duration.measure(count // 2)}
+
+
 def _run(function: Callable[[Any], Any], tasks: Sequence[Any], title: str) -> list[Any]:
     """The rows of all tasks; an interrupted run goes on where it was."""
     file = ROWS / f"{title}.jsonl"
@@ -349,9 +332,10 @@ MEASURES: Mapping[str, Callable[[int], dict[str, Any]]] = {
     "towers": towers,
     "loaded": friction_loaded,
     "friction": friction,
-    "shipped": plans,
+    "plans": plans,
     "closed_loop": closed_loop,
     "disturbed": disturbances,
+    "duration": durations,
 }
 """By part, what measures it, given the number of random plans."""
 

@@ -13,7 +13,7 @@ _TITLES = {
 }
 
 
-PARTS = {"plans", "towers", "friction", *_TITLES} - {"open_loop"}
+PARTS = {"plans", "towers", "friction", "duration_ratio", *_TITLES} - {"open_loop"}
 """Keys of the figures that the page needs."""
 
 
@@ -57,11 +57,11 @@ def _shares(figures: Mapping[str, Any]) -> str:
         "Of the random plans:\n\n"
         "- rows outside any limit, of position, velocity, acceleration, jerk and effort: "
         f"{figures['rows_outside_limits']}\n"
-        f"- duration, as a share of that of the same actions in turn: with both arms {both}, with "
-        f"one {one}\n"
         f"- share of the time in which no arm moves: {100 * figures['waiting_share']:.0f} %\n"
         "- smallest distance from what is not touched: "
         f"{figures['smallest_clearance_mm']:.1f} mm\n\n"
+        "Plans of random actions take, as a share of those that version 0.1.0 makes of them, with "
+        f"both arms {both}, with one {one}.\n\n"
         f"{disturbed['survived']} of the {disturbed['plans']} disturbed plans reached all goals; "
         "for the others, one line says what hinders them.\n"
     )

@@ -117,6 +117,19 @@ def path_verdict(setup: str, number: int, words: list[str]) -> dict[str, Any]:
     return {"feasible": result.feasible, "seconds": time.process_time() - began}
 
 
+def duration(setup: str, number: int, words: list[str]) -> dict[str, Any]:
+    """How long (s) the motion of a skeleton takes, as a user of the version gets it."""
+    place, users = here(setup, number), import_module("guided_lgp.explanation")
+    found = place.bounds
+    if hasattr(users, "users_bounds"):
+        never = import_module("guided_lgp.bounds.deadline").NEVER
+        given = (place.scene, PARAMETERS.bounds, never, ())
+        found = users.users_bounds(*given, coordinate=True)
+    result = found.path(place.skeleton(words))
+    seconds = float(result.trajectory.times[-1]) if result.feasible else None
+    return {"feasible": result.feasible, "duration_s": seconds}
+
+
 def enumerated(setup: str, number: int) -> list[list[str]]:
     """The skeletons of all verdicts that the enumeration of a configuration asks for, in order."""
     with tempfile.TemporaryDirectory() as folder:
@@ -247,6 +260,7 @@ REQUESTS: dict[str, Callable[..., Any]] = {
     "keyframes": keyframes,
     "refusal": refusal,
     "path": path_verdict,
+    "duration": duration,
     "enumeration": enumeration,
     "step": step,
     "logic_tree": logic_tree,

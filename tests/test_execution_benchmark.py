@@ -7,6 +7,7 @@ from guided_lgp.logic import parse_skeleton
 from guided_lgp.scene.generate import generate
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+import duration
 import execution
 
 
@@ -27,7 +28,7 @@ def test_the_page_has_a_row_for_each_part_with_its_faults() -> None:
     figures = {
         **cell,
         "rows_outside_limits": 0,
-        "duration_ratio": {hands: {"median": 0.5, "worst": 0.7} for hands in execution.HANDS},
+        "duration_ratio": {hands: {"median": 0.5, "worst": 0.7} for hands in duration.HANDS},
         "waiting_share": 0.2,
         "smallest_clearance_mm": 2.5,
         "friction": {"0.6": cell},
