@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field, replace
 
+from guided_lgp.bounds.path.assembly import CAREFUL
 from guided_lgp.bounds.path.motions import Motion
 from guided_lgp.bounds.path.situation import Fingers, Situation, Step
 from guided_lgp.bounds.results import Array
@@ -32,8 +33,8 @@ class Stop:
     """(n,) rad"""
     fingers: float
     """Their value on arrival."""
-    careful: bool
-    """Whether boxes are carried there that stand on a box."""
+    slower: float
+    """How many times slower the arm comes there than it could."""
     contact: int | None = None
     """The action in whose contact the hand is ..."""
     acts: bool = False
@@ -196,7 +197,7 @@ class _Reader:
             way_in,
             here if way_in is None else way_in[-1],
             self._now.fingers[gripper],
-            careful=carrying > 1,
+            slower=CAREFUL if carrying > 1 else 1.0,
         )
         self._stops[gripper].append(stop)
         return len(self._stops[gripper]) - 1

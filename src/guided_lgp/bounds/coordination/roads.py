@@ -15,13 +15,12 @@ import numpy as np
 
 from guided_lgp.bounds.coordination.itinerary import Stop
 from guided_lgp.bounds.coordination.law import jerk_limited, ramp
+from guided_lgp.bounds.coordination.turns import best_turns
 from guided_lgp.bounds.coordination.ways import Gap, Way
 from guided_lgp.bounds.path.motions import Mover
 from guided_lgp.bounds.results import Array
 from guided_lgp.robots import Arm, PlacedArm
 
-_CAREFUL = 3.0
-"""How many times slower an arm moves that carries boxes on a box: at full acceleration they tip."""
 _PATIENCE = 8
 """How often a motion is made slower until the fingers have time to move."""
 _SLOWER = 1.15
@@ -89,8 +88,8 @@ class Road:
             gripper: whose arm it is.
             stops: what it has to do.
             waits: whether there is another arm for which it may have to wait.
-            unwinds: whether joints come to a stop by the nearest of their full turns, or by those
-                that the path bound has found.
+            unwinds: whether joints come to a stop by the best of their full turns, or by those that
+                the path bound has found.
         """
         self._arm = mover.arms[gripper].arm
         self._stops = stops
@@ -175,7 +174,7 @@ class Road:
         """The arm moves, and the fingers with it."""
         end = Node(node.stop if node.place < Place.AT else node.stop + 1, place)
         fingers = self._finger_ways(node, end)
-        slower = _CAREFUL if self._stops[end.stop].careful else 1.0
+        slower = self._stops[end.stop].slower
         for _ in range(_PATIENCE):
             q = self._timed(way, slower)
             free = self._between(way, q)
@@ -268,29 +267,16 @@ def _lengths(q: Array, arm: Arm) -> Array:
 
 
 def _gaps(mover: Mover, arm: PlacedArm, stops: Sequence[Stop], unwinds: bool) -> list[Gap]:
-    """What is between the stops; joints unwind if the arm finds all its ways then."""
+    """What is between the stops; joints keep their turns where the arm finds no other way."""
     pairs = list(pairwise(stops))
-    still = [Gap(mover, arm, pair, np.zeros((2, len(pair[0].q)))) for pair in pairs]
-    if not unwinds:
-        return still
-    turned = [
-        Gap(mover, arm, pair, np.stack(turns)) if np.any(turns) else gap
-        for pair, turns, gap in zip(pairs, pairwise(_turns(arm, stops)), still, strict=True)
-    ]
-    return turned if all(gap.direct for gap in turned if gap not in still) else still
-
-
-def _turns(arm: PlacedArm, stops: Sequence[Stop]) -> list[Array]:
-    """Full turns (n,) by which to wind the joints at every stop, so that none winds up or back.
-
-    Where an arm stays in the end it is as the path bound had it.
-    """
-    limits = arm.arm.limits.T
-    turns = [np.zeros(len(limits.T))]
-    for before, stop in pairwise(stops):
-        left = (before.q if stop.way_out is None else stop.way_out[-1]) + turns[-1]
-        path = np.stack([stop.q]) if stop.way_in is None else stop.way_in
-        turn = arm.near(path[0], left) - path[0]
-        beyond = (path + turn < limits[0]) | (path + turn > limits[1])
-        turns.append(np.zeros_like(turn) if beyond.any() or stop is stops[-1] else turn)
-    return turns
+    kept = set[int]() if unwinds else set(range(len(pairs)))
+    made: dict[tuple[int, bytes], Gap] = {}
+    while True:
+        gaps = []
+        for number, turns in enumerate(map(np.stack, pairwise(best_turns(arm, stops, kept)))):
+            new = Gap(mover, arm, pairs[number], turns)
+            gaps.append(made.setdefault((number, turns.tobytes()), new))
+        stuck = {number for number, gap in enumerate(gaps) if gap.direct is None}
+        if not stuck:
+            return gaps
+        kept |= stuck

@@ -23,7 +23,7 @@ from guided_lgp.scene import Scene
 _FINGER_SHARE = 0.9
 """Share of their velocity limit at which fingers move."""
 
-_CAREFUL = 3.0
+CAREFUL = 3.0
 """How many times slower an arm moves that carries boxes on a box: at full acceleration they tip."""
 
 
@@ -57,7 +57,7 @@ def assemble(
             case Motion(arm):
                 clock, values = step.timed
                 stacked = sum(holder == arm.gripper for holder, _ in open_since.values()) > 1
-                clock = (_CAREFUL if stacked else pace) * clock
+                clock = (CAREFUL if stacked else pace) * clock
                 columns = arm.slice
             case Fingers(gripper, value):
                 joints = robot.arms[gripper].fingers
