@@ -14,7 +14,7 @@ from guided_lgp.robots import PlacedArm
 
 _GUESS = 12
 """Configurations of a straight line in joint space from which a path is optimised."""
-_LEG = 3
+_LEG = 2
 """Steps (of about a centimetre) that a hand goes straight at least, off a contact or to one."""
 
 
@@ -54,8 +54,7 @@ class Gap:
         self._mover, self._arm = mover, arm
         self._motions = stops[1].motions
         self.start, self.end = stops[0].q + turns[0], stops[1].q + turns[1]
-        self._wound = not np.array_equal(*turns)
-        self._turn = turns[0]
+        self._turn, self._wound = turns[0], turns[1] - turns[0]
         way_out, way_in = stops[1].way_out, stops[1].way_in
         self._way_out = self.start[None] if way_out is None else way_out + turns[0]
         self._way_in: Array = self.end[None] if way_in is None else way_in + turns[1]
@@ -115,14 +114,16 @@ class Gap:
         found = [motion.path + self._turn for motion in motions]
         transit = motions[-1].transit
         assert transit is not None
+        wound = self._wound if arrives else np.zeros_like(self._wound)
         for lines in ((out, into), longest):
             before, after = (longest[0][len(lines[0]) - 1 :], longest[1][::-1][len(lines[1]) - 1 :])
-            detour = np.concatenate([before, *found, after[::-1]])
+            detour = np.concatenate([before, *found, after[::-1] - wound])
+            detour += np.linspace(0.0, 1.0, len(detour))[:, None] * wound
             path = self._free(transit, lines, detour)
             if path is not None:
                 whole = np.concatenate([lines[0], path[1:], lines[1][1:]])
                 return Way((whole,), _straight(out), _straight(into))
-        if self._wound and arrives:
+        if wound.any():
             return None
         pieces = tuple(path for path in (longest[0], *found, longest[1]) if len(path) > 1)
         return Way(pieces, _straight(out), _straight(into))
@@ -131,9 +132,8 @@ class Gap:
         """The best free path (m, n) between two straight ways, begun from the line between them or
         from a detour.
         """
-        guesses = [] if transit.keep_level else [np.linspace(detour[0], detour[-1], _GUESS)]
-        if not self._wound:
-            guesses.append(detour)
+        line = np.linspace(detour[0], detour[-1], _GUESS)
+        guesses = [detour] if transit.keep_level else [line, detour]
         beside = [line if len(line) > 1 else None for line in lines]
         paths = (optimal_path(self._mover, transit, guess, *beside) for guess in guesses)
         return next((path for path in paths if path is not None), None)
