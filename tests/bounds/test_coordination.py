@@ -8,8 +8,9 @@ import pytest
 
 from guided_lgp.bounds.checks import box_sizes
 from guided_lgp.bounds.coordination import Coordinator
-from guided_lgp.bounds.coordination.itinerary import Itinerary, itinerary
+from guided_lgp.bounds.coordination.itinerary import Itinerary, Stop, itinerary
 from guided_lgp.bounds.coordination.law import TICK, jerk_limited, ramp
+from guided_lgp.bounds.coordination.turns import best_turns
 from guided_lgp.bounds.path.situation import situation_at_start
 from guided_lgp.bounds.results import PathResult, Trajectory
 from guided_lgp.bounds.scene_bounds import SceneBounds
@@ -156,6 +157,20 @@ def test_the_time_law_keeps_velocity_acceleration_and_jerk(slower: float) -> Non
     ):
         assert np.all(np.abs(np.diff(rates, order, axis=0)) / TICK**order <= limit)
     assert len(rows) > len(jerk_limited(path, arm)) - 1
+
+
+def test_joints_come_by_the_turns_that_cost_least_in_all() -> None:
+    robot = load_scene(EXAMPLE).robot
+    arm = PlacedArm(PR2, "pr2L", robot.base_pose, robot.fixed_values)
+    wrist, home = 6, arm.arm.home
+    stops = [
+        Stop((), None, None, home + turned * np.eye(7)[wrist], fingers=0.0, slower=1.0)
+        for turned in (0.0, 2.0, 5.0, 0.0)
+    ]
+    free = best_turns(arm, stops, kept=())
+    assert [turns[wrist] for turns in free] == pytest.approx([0.0, 0.0, -2 * np.pi, 0.0])
+    assert not np.delete(free, wrist, axis=1).any()
+    assert not np.any(best_turns(arm, stops, kept=(1, 2)))
 
 
 def test_fingers_start_and_stop_gently() -> None:
