@@ -99,8 +99,8 @@ def test_the_hand_rests_while_its_fingers_are_near_the_body(
         opened = clear[clear > attachment.end][0]
         assert not np.ptp(q[closing : attachment.start + 1, arm.slice], axis=0).any()
         assert not np.ptp(q[attachment.end : opened + 1, arm.slice], axis=0).any()
-        assert np.ptp(q[closing - 1 : closing + 1, arm.slice], axis=0).any()
-        assert np.ptp(q[opened : opened + 2, arm.slice], axis=0).any()
+        assert np.ptp(q[closing - 2 : closing + 1, arm.slice], axis=0).any()
+        assert np.ptp(q[opened : opened + 3, arm.slice], axis=0).any()
 
 
 def test_the_same_plan_twice(apart: tuple[Scene, PathResult], together: PathResult) -> None:
