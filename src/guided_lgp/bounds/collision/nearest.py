@@ -46,10 +46,15 @@ class Nearest:
             distances (m, count) in m, negative where bodies penetrate, and their gradients
             (m, count, n) in m/rad.
         """
-        values = np.empty((len(coordinates), count))
-        wrenches = np.empty((len(coordinates), count, 2, 6))
-        moved = np.empty((len(coordinates), count, 2, len(self._columns)))
-        jacobians = np.empty((len(coordinates), 6, len(self._columns)))
+        shape = len(coordinates), count
+        values, normals, points = (
+            np.empty(shape),
+            np.empty((*shape, 1, 3)),
+            np.empty((*shape, 2, 3)),
+        )
+        joints = np.empty((*shape, 2), dtype=int)
+        jacobians = np.empty((len(coordinates), 1, 6, len(self._columns)))
+        results, pair_of = self._geometry_data.distanceResults, self._geometry.collisionPairs
         for row, configuration in enumerate(coordinates):
             pin.computeJointJacobians(self._model, self._data, configuration)
             pin.updateGeometryPlacements(
@@ -57,10 +62,15 @@ class Nearest:
             )
             jacobians[row] = self._data.J[:, self._columns]
             for column, (distance, pair) in enumerate(self._nearest(pairs, least[row], count)):
-                values[row, column] = distance
-                wrenches[row, column], joints = self._pull(pair)
-                moved[row, column] = self._moves[joints]
-        rates = (wrenches @ jacobians[:, None]) * moved
+                result = results[pair]
+                values[row, column], normals[row, column] = distance, result.normal
+                points[row, column, 0] = result.getNearestPoint1()
+                points[row, column, 1] = result.getNearestPoint2()
+                joints[row, column] = self._joints_of(pair_of[pair])
+        # A pull at a point along the normal is a force and a torque about the world's origin.
+        forces = np.broadcast_to(normals, points.shape)
+        wrenches = np.concatenate([forces, np.cross(points, forces)], axis=-1)
+        rates = (wrenches @ jacobians) * self._moves[joints]
         return values, rates[:, :, 1] - rates[:, :, 0]
 
     def _nearest(
@@ -75,16 +85,7 @@ class Nearest:
             insort(found, (result.min_distance, pairs[place]))
         return found[:count]
 
-    def _pull(self, pair: int) -> tuple[Array, list[int]]:
-        """Unit forces and torques (2, 6) in the world along the distance of a pair, at the nearest
-        points, and the joints that its bodies hang on.
-        """
-        result, bodies = (
-            self._geometry_data.distanceResults[pair],
-            self._geometry.collisionPairs[pair],
-        )
-        points = np.array([result.getNearestPoint1(), result.getNearestPoint2()])
-        normal = np.broadcast_to(result.normal, (2, 3))
-        objects = self._geometry.geometryObjects
-        joints = [objects[body].parentJoint for body in (bodies.first, bodies.second)]
-        return np.hstack([normal, np.cross(points, normal)]), joints
+    def _joints_of(self, pair: Any) -> tuple[int, int]:
+        """The joints that the bodies of a pair hang on."""
+        bodies = self._geometry.geometryObjects
+        return bodies[pair.first].parentJoint, bodies[pair.second].parentJoint
