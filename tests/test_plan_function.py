@@ -2,6 +2,7 @@
 
 import inspect
 import json
+import re
 import textwrap
 from pathlib import Path
 
@@ -174,6 +175,21 @@ def test_the_readme_lists_every_scene() -> None:
     for file in EXAMPLES.glob("*.json"):
         assert f"`{file.name}`" in text
         assert json.loads(file.read_text())["name"] == file.stem.replace("_", "-")
+
+
+@pytest.mark.parametrize(
+    ("name", "goals", "actions"),
+    re.findall(
+        r"^\| `(\w+\.json)` \|.*\| `(--goal .*)` \| (\d) actions \|$",
+        (EXAMPLES / "README.md").read_text(),
+        flags=re.MULTILINE,
+    ),
+)
+def test_an_example_takes_as_many_actions_as_the_readme_says(
+    name: str, goals: str, actions: str
+) -> None:
+    result = plan(EXAMPLES / name, re.findall(r"\(.*?\)", goals))
+    assert len(result.skeleton or ()) == int(actions)
 
 
 def test_the_docstring_of_the_package_runs(
