@@ -58,6 +58,17 @@ def test_what_stands_where_a_box_is_wanted() -> None:
 
 
 @pytest.mark.parametrize(
+    ("region", "expected"),
+    [
+        ("-0.1 0.02 0.06 0.14", {"green"}),  # around green
+        ("-0.1 -0.1 0.06 0.14", set()),  # and room beside it
+    ],
+)
+def test_what_fills_a_region(region: str, expected: set[str]) -> None:
+    assert in_the_way("red", parse_objective([f"(in red tab2 {region})"]), SCENE) == expected
+
+
+@pytest.mark.parametrize(
     ("goals", "fault"),
     [
         ("(at red 0.5 -0.3 0.65 0) (at red 0.6 -0.3 0.65 0)", "red is in one place only"),

@@ -79,6 +79,17 @@ def test_what_fingertips_have_no_room_on() -> None:
     assert facts(parse_scene(bodies, "mine"), "(on red tab2)").before_search() is None
 
 
+def test_what_is_to_stay_level_and_is_not() -> None:
+    """By default a hand holds its box from above; at its side it does not point down."""
+    document = NEAR.model_dump(mode="json")
+    document["boxes"][0] = {"name": "red", "size": [0.15, 0.07, 0.1], "on": "pr2L"}
+    held = parse_scene(document, "mine")
+    finding = found(facts(held, "(on red tab2)", "(upright red)").before_search())
+    assert finding.kind == "tilted"
+    assert finding.text.startswith("red is to stay level, and pr2L holds it tilted by 2.3")
+    assert facts(held, "(on red tab2)", "(upright green)").before_search() is None
+
+
 def test_boxes_too_tight_together() -> None:
     """No proof by discs, yet no arm puts both there."""
     tray = NEAR.tables[1].model_copy(update={"half_extents": (0.03, 0.03)})

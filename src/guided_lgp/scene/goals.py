@@ -1,14 +1,16 @@
 """Goals that say more than symbols, read against a scene."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from guided_lgp.errors import InputError
 from guided_lgp.logic import Goal, Objective
+from guided_lgp.poses import Array
 from guided_lgp.scene.bodies import METRES, RADIANS, Box, Table
-from guided_lgp.scene.footprints import footprint, gap, inset
+from guided_lgp.scene.footprints import footprint, gap, gaps, inset
 from guided_lgp.scene.model import Scene
 from guided_lgp.scene.tolerances import FLOAT
 
@@ -38,6 +40,8 @@ def in_the_way(body: str, objective: Objective, scene: Scene) -> frozenset[str]:
         for term in scene.symbols.domain.final_terms(goal):
             if term.symbols[0] == body and "yaw" in term.options:
                 found |= _overlapped(box, term.options, scene)
+            elif term.symbols[0] == body and "x0" in term.options:
+                found |= _filling(box, term.symbols[1], term.options, scene)
     return frozenset(found)
 
 
@@ -52,6 +56,48 @@ def _overlapped(body: Box, numbers: Mapping[str, str | float], scene: Scene) -> 
         and abs(other.position[2] - z) < (body.size[2] + other.size[2]) / 2 - FLOAT
         and gap(footprint(there), footprint(other)) < 0
     }
+
+
+def _filling(body: Box, support: str, numbers: Mapping[str, str | float], scene: Scene) -> set[str]:
+    """The boxes beside which a box has no place in a region: one of them, if that is enough."""
+    places = _places(body, support, numbers, scene)
+    around = [box for box in scene.movable if box.on == support and box.name != body.name]
+    taken = {box.name: gaps(places, footprint(box)[None])[:, 0] < 0 for box in around}
+    if not len(places) or not _full(taken.values()):
+        return set()
+    for name in taken:
+        if not _full(where for other, where in taken.items() if other != name):
+            return {name}
+    return {name for name, where in taken.items() if where.any()}
+
+
+def _full(taken: Iterable[NDArray[np.bool_]]) -> bool:
+    """Whether every place is taken by one of some boxes."""
+    several = list(taken)
+    return bool(several and np.any(several, axis=0).all())
+
+
+def _places(body: Box, support: str, numbers: Mapping[str, str | float], scene: Scene) -> Array:
+    """Footprints (n, 4, 2) of a body all over a region of a support."""
+    (below,) = (one for one in (*scene.supports, *scene.movable) if one.name == support)
+    x0, y0, x1, y1 = (float(numbers[name]) for name in ("x0", "y0", "x1", "y1"))
+    axes = np.linspace(x0, x1, _GRID), np.linspace(y0, y1, _GRID), np.linspace(0, np.pi, _TURNS)
+    x, y, turns = np.reshape(np.meshgrid(*axes), (3, -1))
+    standing = footprint(body.model_copy(update={"position": (0.0, 0.0, 0.0), "yaw": 0.0}))
+    corners = np.stack([x, y], axis=1)[:, None] + _turned(standing, turns)
+    inside = (corners >= [x0, y0]).all(axis=(1, 2)) & (corners <= [x1, y1]).all(axis=(1, 2))
+    return np.array(below.position[:2]) + _turned(corners[inside], np.array([below.yaw]))
+
+
+def _turned(corners: Array, angles: Array) -> Array:
+    """Points (..., 4, 2) turned by angles (n,)."""
+    c, s = np.cos(angles), np.sin(angles)
+    turns = np.stack([c, s, -s, c], axis=-1).reshape(-1, 2, 2)
+    return np.asarray(corners @ turns)
+
+
+_GRID, _TURNS = 15, 9
+"""Steps along either side of a region, and over half a turn, at which a box is put there."""
 
 
 def _complete(goal: Goal, scene: Scene) -> Goal:

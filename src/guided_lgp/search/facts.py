@@ -13,6 +13,8 @@ from guided_lgp.bounds.coarse.pairs import Pairs
 from guided_lgp.bounds.coarse.parts import Boxes, stacked_with
 from guided_lgp.bounds.deadline import NEVER, Deadline
 from guided_lgp.bounds.scene_bounds import SceneBounds
+from guided_lgp.bounds.terms.level import CARRY_ANGLE
+from guided_lgp.bounds.terms.stand import tilt
 from guided_lgp.domains import extensions, load_domain
 from guided_lgp.logic import (
     Action,
@@ -31,6 +33,7 @@ from guided_lgp.robots import Robot
 from guided_lgp.scene.bodies import Box, Table
 from guided_lgp.scene.footprints import footprint, gap
 from guided_lgp.scene.grasps import is_held_flat
+from guided_lgp.scene.world import initial_poses
 from guided_lgp.search.conflicts import Conflicts
 from guided_lgp.search.finding import Finding
 from guided_lgp.search.lengths import too_far
@@ -107,6 +110,7 @@ class TaskFacts:
             if self._denied(body, parents):
                 yield self._out_of_reach(" and ".join(sorted(parents)))
             yield from self._too_low(body, parents)
+        yield from self._tilted()
         for support in self._symbols.tables:
             boxes = [self._boxes[name] for name in self._wanted_on(support)]
             spare = len(self._boxes) - len(boxes) - (support in self._boxes)
@@ -139,6 +143,17 @@ class TaskFacts:
         takings = self._takings(body)
         if takings and all(map(self._cannot_take, takings)):
             yield self._out_of_reach(body)
+
+    def _tilted(self) -> Iterator[Finding]:
+        """Bodies in hands that goals want level all the time, and are not so at the start."""
+        for goal in self._objective:
+            for term in self._symbols.domain.lasting_terms(goal):
+                body, poses = term.symbols[0], initial_poses(self.scene)
+                if term.name == "upright" and tilt(poses[body].tolist()) > CARRY_ANGLE:
+                    angle, holder = tilt(poses[body].tolist()), self._state.holder(body)
+                    text = f"{body} is to stay level, and {holder} holds it tilted by {angle:.2f}"
+                    what = "another grasp or posture at the start"
+                    yield Finding("tilted", f"{text} rad at the start", what)
 
     def _cannot_take(self, taking: Action) -> bool:
         """Whether it is proved that an arm does not reach a box at its start."""

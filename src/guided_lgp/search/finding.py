@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-Kind = Literal["width", "reach", "room", "way", "blocked", "part", "posture"]
+Kind = Literal["width", "reach", "room", "way", "blocked", "part", "posture", "tilted"]
 
 KINDS: dict[Kind, str] = {
     "width": "too wide for the fingers",
@@ -13,6 +13,7 @@ KINDS: dict[Kind, str] = {
     "blocked": "neighbours in the way",
     "part": "no solution even alone",
     "posture": "no motion found to the posture",
+    "tilted": "tilted at the start",
 }
 """What may be found, in the words of the glossary."""
 
