@@ -177,6 +177,8 @@ class PlanningParams(Section):
 class Demonstrations(Section):
     """The training set of a case."""
 
+    family: str
+    """That of the test set, or another one with the same numbers."""
     size: Annotated[int, Field(strict=True, ge=1, le=15)]
     """Boxes per scene."""
     scenes: Annotated[int, Field(strict=True, ge=2, le=100_000)]
@@ -204,8 +206,9 @@ class Case(Section):
     domain: str
     robot: str
     family: str
+    """Of the test set."""
     layout: dict[str, Any] = {}
-    """What differs from the family's usual numbers."""
+    """What differs from the families' usual numbers."""
     demonstrations: Demonstrations
     training: TrainRelational
     seeds: Annotated[tuple[Seed, ...], Field(min_length=1)]

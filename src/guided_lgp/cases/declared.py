@@ -20,31 +20,38 @@ from guided_lgp.scene.model import PlacedRobot
 
 
 @dataclass(frozen=True)
+class Source:
+    """Where problems come from: a family, and its numbers."""
+
+    family: Family
+    layout: Layout
+
+
+@dataclass(frozen=True)
 class DeclaredCase:
     """A case with all that its names stand for."""
 
     name: str
     params: Case
-    family: Family
-    layout: Layout
+    trained_on: Source
+    tested_on: Source
 
     def training(self) -> Iterator[tuple[Scene, list[Objective]]]:
         """The scenes of the demonstrations, each with what is wanted there."""
-        wanted = self.params.demonstrations
-        for index, drawn in enumerate(
-            self._drawn("training", wanted.size, wanted.scenes, wanted.seed)
-        ):
+        wanted, source = self.params.demonstrations, self.trained_on
+        drawn = self._drawn(source, "training", wanted.size, wanted.scenes, wanted.seed)
+        for index, one in enumerate(drawn):
             rng = np.random.default_rng(np.random.SeedSequence((wanted.seed, index)))
-            yield drawn.scene, self.family.training_objectives(drawn.scene, rng)
+            yield one.scene, source.family.training_objectives(one.scene, rng)
 
     def problems(self, size: int) -> list[Drawn]:
         """The problems of one size of the test set."""
         wanted = self.params.evaluation
-        return self._drawn("test", size, wanted.scenes, wanted.seed)
+        return self._drawn(self.tested_on, "test", size, wanted.scenes, wanted.seed)
 
-    def _drawn(self, purpose: str, size: int, count: int, seed: int) -> list[Drawn]:
+    def _drawn(self, source: Source, purpose: str, size: int, count: int, seed: int) -> list[Drawn]:
         prefix = f"{self.name}-{purpose}-{size}"
-        found = draw_problems(self.family, self.layout, size, count, seed, prefix)
+        found = draw_problems(source.family, source.layout, size, count, seed, prefix)
         robot = PlacedRobot(model=self.params.robot)
         update = {"domain": self.params.domain, "robot": robot}
         return [Drawn(one.scene.model_copy(update=update), one.objective) for one in found]
@@ -65,10 +72,15 @@ def declared_case(params: Params, name: str) -> DeclaredCase:
         fault = f"unknown domain {case.domain!r}"
         raise InputError(f"{where}.domain", fault, ", ".join(domain_names()))
     load_robot(case.robot)
-    family = find_family(case.family, f"{where}.family")
-    layout = validated(family.layout.model_validate, case.layout, f"{where}.layout")
+    tested_on = _source(case, case.family, where, "family")
+    trained_on = _source(case, case.demonstrations.family, where, "demonstrations.family")
     controls = [control for control in SIGHTS if control != FULL]
     for control in case.controls:
         if control not in controls:
             raise InputError(f"{where}.controls", f"unknown {control!r}", ", ".join(controls))
-    return DeclaredCase(name, case, family, layout)
+    return DeclaredCase(name, case, trained_on, tested_on)
+
+
+def _source(case: Case, family: str, where: str, key: str) -> Source:
+    found = find_family(family, f"{where}.{key}")
+    return Source(found, validated(found.layout.model_validate, case.layout, f"{where}.layout"))
