@@ -31,6 +31,8 @@ def rotate(quaternion: Array, vector: Array) -> Array:
 
 def multiply(first: Array, second: Array) -> Array:
     """Product of quaternions (..., 4): apply ``second``, then ``first``."""
+    if first.ndim == second.ndim == 1:
+        return np.array(_multiply_two(*first.tolist(), *second.tolist()))
     a, s = first[..., :3], first[..., 3:]
     b, t = second[..., :3], second[..., 3:]
     vector = s * b + t * a + _cross(a, b)
@@ -71,6 +73,14 @@ def _compose_two(first: list[float], second: list[float]) -> tuple[float, ...]:
         x + (u + s * k + (b * n - c * m)),
         y + (v + s * m + (c * k - a * n)),
         z + (w + s * n + (a * m - b * k)),
+        *_multiply_two(a, b, c, s, d, e, f, t),
+    )
+
+
+def _multiply_two(
+    a: float, b: float, c: float, s: float, d: float, e: float, f: float, t: float
+) -> tuple[float, float, float, float]:
+    return (
         s * d + t * a + (b * f - c * e),
         s * e + t * b + (c * d - a * f),
         s * f + t * c + (a * e - b * d),

@@ -132,7 +132,7 @@ class PlacedRobot(BaseModel):
             gripper: links
             if arms[gripper].tool_is_link
             else compose(links, arms[gripper].tool_in_link)
-            for gripper, links in zip(wanted, np.moveaxis(poses, 1, 0), strict=True)
+            for gripper, links in zip(wanted, poses.transpose(1, 0, 2), strict=True)
         }
 
     @model_validator(mode="before")

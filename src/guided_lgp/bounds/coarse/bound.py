@@ -236,10 +236,10 @@ class CoarseBound:
         decode = partial(self._decoder.keyframes, formulation, values=solution.values)
         if prefix is None:
             return decode(at_switch), decode(after)
-        return (*prefix.at_switch, *decode(at_switch[-1:])), (
-            *prefix.after_action,
-            *decode(after[-1:]),
-        )
+        last = prefix.after_action[-1].boxes
+        known = {id(where): last[name] for name, where in after[-2].boxes.items()}
+        switch, end = decode((at_switch[-1], after[-1]), known=known)
+        return (*prefix.at_switch, switch), (*prefix.after_action, end)
 
 
 _PROVED = "proved for the arm alone, collisions left out"

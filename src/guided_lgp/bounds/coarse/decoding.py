@@ -1,6 +1,7 @@
 """From values of a program back to keyframes in the world, and to the constraint that fails."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
 
 import numpy as np
 
@@ -30,15 +31,26 @@ class Decoder:
         }
 
     def keyframes(
-        self, formulation: Formulation, keyframes: Iterable[KeyframeSlots], values: Array
+        self,
+        formulation: Formulation,
+        keyframes: Iterable[KeyframeSlots],
+        values: Array,
+        known: Mapping[int, Array] = MappingProxyType({}),
     ) -> tuple[Keyframe, ...]:
-        """Arms and boxes in the world at keyframes of the program."""
-        poses: dict[int, Array] = {}
+        """Arms and boxes in the world at keyframes of the program.
+
+        Args:
+            formulation: the program.
+            keyframes: of it.
+            values: of its variables, then its constants.
+            known: poses of boxes, by the identity of their slots.
+        """
+        poses = dict(known)  # most boxes stand where they stood before
         frames = []
         for slots in keyframes:
             boxes = {}
             for name, where in slots.boxes.items():
-                if id(where) not in poses:  # most boxes stand where they stood before
+                if id(where) not in poses:
                     poses[id(where)] = self._box_pose(formulation, where, values)
                 boxes[name] = poses[id(where)]
             frames.append(Keyframe(self._configuration(slots, values), boxes))

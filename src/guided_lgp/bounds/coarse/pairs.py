@@ -71,8 +71,10 @@ class Pairs:
     def impossible(self, skeleton: Skeleton) -> Failure | None:
         """What makes the last action of a sequence impossible, as far as facts of pairs go."""
         *before, last = skeleton
+        if not self._bind(last).into_hand or self._known.get(last) == ():
+            return None
         moved = self._moved(tuple(before))
-        if self._bind(last).body in moved or not self._bind(last).into_hand:
+        if self._bind(last).body in moved:
             return None
         for boxes in self.blockers(last):
             if not boxes & moved:

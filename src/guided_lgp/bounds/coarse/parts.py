@@ -14,7 +14,7 @@ from guided_lgp.bounds.results import Array, CoarseResult
 from guided_lgp.logic import Skeleton, successor
 from guided_lgp.poses import pose
 from guided_lgp.scene import Scene
-from guided_lgp.scene.world import World, world_of
+from guided_lgp.scene.world import Placement, World, world_of
 
 Boxes = frozenset[str]
 
@@ -88,13 +88,16 @@ class _PartOfWorld(World):
         self.scene = part
         kept = {box.name for box in part.boxes}
         self._parked = {
-            name: pose((0.0, 0.0, -_DEPTH * number))
+            name: pose((0.0, 0.0, -_DEPTH * number)).tolist()
             for number, name in enumerate(self.boxes, 1)
             if name not in kept
         }
 
     def set(
-        self, q: Array, boxes: Mapping[str, Array], fingers: Mapping[str, float] | None = None
+        self,
+        q: Array,
+        boxes: Mapping[str, Placement],
+        fingers: Mapping[str, float] | None = None,
     ) -> None:
         super().set(q, {**self._parked, **boxes}, fingers)
 

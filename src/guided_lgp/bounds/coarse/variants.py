@@ -13,6 +13,7 @@ from guided_lgp.bounds.program.geometry import SceneGeometry
 from guided_lgp.bounds.program.grasp import grasp_sides
 from guided_lgp.logic import Skeleton, State, successor
 from guided_lgp.logic.domain import GroundInstruction
+from guided_lgp.robots import Arm
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,8 @@ class Variants:
 
     def __init__(self, geometry: SceneGeometry, skeleton: Skeleton) -> None:
         grounds = [geometry.domain.bind(action) for action in skeleton]
-        self._sides = [_side_count(geometry, ground) for ground in grounds]
+        arms = geometry.scene.robot.description.arms
+        self._sides = [_side_count(geometry, arms.get(ground.parent), ground) for ground in grounds]
         self._low = list(_way_counts(geometry, grounds))
 
     def tried(self, number: int, generator: np.random.Generator, kept: Variant) -> Variant:
@@ -63,9 +65,8 @@ def _drawn(generator: np.random.Generator, counts: Sequence[int]) -> tuple[int, 
     return tuple(int(generator.integers(count)) if count > 1 else 0 for count in counts)
 
 
-def _side_count(geometry: SceneGeometry, ground: GroundInstruction) -> int:
+def _side_count(geometry: SceneGeometry, arm: Arm | None, ground: GroundInstruction) -> int:
     """On how many sides the grip that an action begins can close; 1 where none is, or it is new."""
-    arm = geometry.scene.robot.description.arms.get(ground.parent)
     return 1 if arm is None else max(1, len(grasp_sides(geometry, ground.body, arm)))
 
 

@@ -56,7 +56,7 @@ class Draft:
         """The index of the least cost, or of another low one."""
         if self.noise:
             costs = costs + self.noise * self.generator.exponential(1.0, costs.shape)
-        return int(np.argmin(costs))
+        return int(costs.argmin())
 
 
 def pose_values(

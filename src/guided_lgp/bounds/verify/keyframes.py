@@ -82,7 +82,7 @@ def _faults(
     changed = [box for box, stack in reached.stacks.items() if good.get(box) != stack]
     violations += placement_faults(world.scene, boxes, support, changed)
     violations += _effort_faults(world.scene, reached, held, support)
-    world.set(reached.keyframe.q, reached.keyframe.boxes, fingers)
+    world.set(reached.keyframe.q, reached.boxes, fingers)
     bodies = body_names(world.scene)
     violations += [
         Violation(overlap_name(overlap.first, overlap.second, bodies), overlap.depth)
