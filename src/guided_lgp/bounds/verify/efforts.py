@@ -12,6 +12,7 @@ from guided_lgp.bounds.results import Array, Attachment
 from guided_lgp.bounds.verify.attachments import carriers, spans
 from guided_lgp.logic import Skeleton
 from guided_lgp.poses import apply, compose, inverse, rotation_matrix
+from guided_lgp.robots import Robot
 from guided_lgp.robots.kinematics import JointIndex, fill, joint_index
 from guided_lgp.scene import Scene
 from guided_lgp.scene.world import BOX_DENSITY, initial_poses
@@ -153,7 +154,8 @@ def _lifting(scene: Scene, gripper: str, q: Array, centre: Array, forces: Array)
     """Torques (R, n) of forces (R, 3) on the centre (3,) of a load in a tool frame."""
     import pinocchio
 
-    arm, arms = scene.robot.description.arms[gripper], _arms(scene, weightless=False)
+    robot = scene.robot.description
+    arm, arms = robot.arms[gripper], _arms(scene, weightless=robot.balanced)
     frame = arms.model.getFrameId(arm.tool_link)
     point = apply(arm.tool_in_link, centre)
     jacobians, turned = [], []
@@ -188,18 +190,26 @@ class _Arms:
         return full
 
 
-@lru_cache(maxsize=4)
 def _arms(scene: Scene, weightless: bool) -> _Arms:
     """The arms of a scene's robot, under gravity or without it."""
+    fixed = tuple(sorted(scene.robot.fixed_values.items()))
+    turn = tuple(scene.robot.base_pose[3:].tolist())
+    return _mounted(scene.robot.description, turn, fixed, weightless)
+
+
+@lru_cache(maxsize=8)
+def _mounted(
+    robot: Robot, turn: tuple[float, ...], fixed: tuple[tuple[str, float], ...], weightless: bool
+) -> _Arms:
+    """The arms of a robot whose root is turned so, as a quaternion."""
     import pinocchio
 
-    kinematics = scene.robot.description.kinematics
-    (home,) = kinematics.rows(scene.robot.start[None], scene.robot.fixed_values)
+    kinematics = robot.kinematics
+    (home,) = kinematics.rows(robot.home[None], dict(fixed))
     names = list(kinematics.model.names)
     still = [number for number in range(1, len(names)) if names[number] not in kinematics.names]
     model = pinocchio.buildReducedModel(kinematics.model, still, home)
     down = np.array([0.0, 0.0, 0.0 if weightless else -GRAVITY])
-    down = down @ rotation_matrix(scene.robot.base_pose[3:])
-    model.gravity = pinocchio.Motion(down, np.zeros(3))
+    model.gravity = pinocchio.Motion(down @ rotation_matrix(np.array(turn)), np.zeros(3))
     joints = tuple(joint_index(model, name) for name in kinematics.names)
     return _Arms(model, model.createData(), joints)
