@@ -174,7 +174,7 @@ def test_pages_hold_the_tables_and_the_findings(rendered: Path, tmp_path: Path) 
     assert "old" not in text
     assert (tmp_path / "clone/docs/images/solved.png").is_file()
     results = (tmp_path / "clone/docs/results.md").read_text()
-    assert results.count("**Table I") >= 3
+    assert results.count("## Table I") >= 3
     assert "K = 20: e.10" in results
     assert "crowded rows" not in text
     about_cases = tmp_path / "clone/docs/cases.md"

@@ -79,10 +79,16 @@ def _tables(root: Path) -> list[str]:
     for name in (*TABLES, *OPTIONAL):
         path = root / REPORTS / "tables" / f"{name}.md"
         if path.is_file():
-            texts.append(read_text(path))
+            texts.append(_headed(read_text(path)))
         elif name in TABLES:
             raise InputError(str(path), "is missing", "the output of stage render_reports")
     return texts
+
+
+def _headed(table: str) -> str:
+    """A table whose title is a heading, so that a list of contents has it."""
+    title, _, rest = table.partition("\n")
+    return f"## {title.removeprefix('**').removesuffix('**')}\n{rest}"
 
 
 def _replace(page: Path, block: str) -> None:
