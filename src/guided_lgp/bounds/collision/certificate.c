@@ -176,25 +176,27 @@ static INLINE int any_of(const int *near)
     return any;
 }
 
-static INLINE void pair_near(const scene *s, const pose *poses, int a, int b, float padding, int *near)
+/* near: 1 where two bodies may come closer than the padding. Returns whether any do. */
+static INLINE int pair_near(const scene *s, const pose *poses, int a, int b, float padding, int *near)
 {
     if (!spheres_near(&poses[a], &poses[b], s->radius[a] + s->radius[b] + padding, near))
-        return;
+        return 0;
     const float *half_a = s->half + 3 * a, *half_b = s->half + 3 * b;
     pose b_in_a, a_in_b;
     relative(&poses[a], &poses[b], &b_in_a);
     boxes(&b_in_a, half_a, half_b, padding, near);
     if (!any_of(near))
-        return;
+        return 0;
     relative(&poses[b], &poses[a], &a_in_b);
     boxes(&a_in_b, half_b, half_a, padding, near);
     if (!any_of(near))
-        return;
+        return 0;
     const int *start = s->start;
     vertices(&b_in_a, half_a, s->vertices + 3 * start[b], start[b + 1] - start[b], padding, near);
     if (!any_of(near))
-        return;
+        return 0;
     vertices(&a_in_b, half_b, s->vertices + 3 * start[a], start[a + 1] - start[a], padding, near);
+    return any_of(near);
 }
 
 /* Where all bodies are in the configurations from the first on; behind the last it stays. */
@@ -215,8 +217,8 @@ static INLINE void place(const scene *s, int first, int count, const float *valu
         body_pose(s->frame + 12 * i, s->joint[i] < 0 ? 0 : &joints[s->joint[i]], &poses[i]);
 }
 
-/* Values, sines and one minus cosines (count, joints) to near (count, pairs): 1 unless it is sure
- * that a pair of bodies is farther apart than the padding. */
+/* Values, sines and one minus cosines (count, joints) to near (count, pairs), which is zero before:
+ * 1 unless it is sure that a pair of bodies is farther apart than the padding. */
 WIDEST void certify(const scene *s, int pairs, const int *pair, float padding, int count,
              const float *value, const float *sine, const float *versine, unsigned char *near)
 {
@@ -225,7 +227,8 @@ WIDEST void certify(const scene *s, int pairs, const int *pair, float padding, i
         place(s, first, count, value, sine, versine, joints, poses);
         for (int p = 0; p < pairs; p++) {
             int unsure[LANES];
-            pair_near(s, poses, pair[2 * p], pair[2 * p + 1], padding, unsure);
+            if (!pair_near(s, poses, pair[2 * p], pair[2 * p + 1], padding, unsure))
+                continue;
             for (int l = 0; l < LANES && first + l < count; l++)
                 near[(long)(first + l) * pairs + p] = unsure[l];
         }

@@ -97,10 +97,11 @@ class Certificate:
             pairs: (p, 2) numbers of bodies, contiguous.
             padding: the distance (m) at which they are near.
         """
-        near = np.ones((len(values), len(pairs)), dtype=np.bool_)
-        if self._library is not None:
-            apart = ctypes.c_float(padding + _ROUNDING)
-            self._find(self._library.certify, near, values, pairs, apart)
+        if self._library is None:
+            return np.ones((len(values), len(pairs)), dtype=np.bool_)
+        near = np.zeros((len(values), len(pairs)), dtype=np.bool_)
+        apart = ctypes.c_float(padding + _ROUNDING)
+        self._find(self._library.certify, near, values, pairs, apart)
         return near
 
     def gaps(self, values: Array, pairs: NDArray[np.intc]) -> NDArray[np.float32]:
