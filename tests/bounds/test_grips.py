@@ -135,3 +135,12 @@ def test_only_what_is_below_something_has_a_low_way() -> None:
     above = variants(box(0.15, 0.07, 0.10), lid=0.4)
     assert {one.low for one in starts(below, Variant())} > {(0, 0)}
     assert {one.low for one in starts(above, Variant())} == {(0, 0)}
+
+
+def test_where_places_are_given_all_choices_meet() -> None:
+    """Of a box with two pairs of sides in a shelf; where nothing is left, the number stays."""
+    choices = variants(box(0.05, 0.04, 0.07), lid=0.9)
+    assert (choices.starts(2), choices.starts(12)) == (8, 12)
+    found = starts(choices, Variant(), choices.starts(2))
+    assert {(one.sides[0], one.low[0]) for one in found[1::2]} == {(0, 0), (0, 1), (1, 0), (1, 1)}
+    assert variants(box(0.15, 0.07, 0.10)).starts(2) == 2

@@ -112,7 +112,7 @@ class CoarseBound:
             return result
         started = time.perf_counter()
         programs = self._programs(result.skeleton, self._goals)
-        found = self._first_feasible(programs, None)
+        found = self._first_feasible(programs, None, programs.variants.starts(self._restarts))
         return replace(found, time_s=time.perf_counter() - started)
 
     def solutions(self, skeleton: Skeleton, count: int) -> Iterator[CoarseResult]:
@@ -135,16 +135,19 @@ class CoarseBound:
 
     def _search(self, skeleton: Skeleton, prefix: CoarseSolution | None) -> CoarseSolution:
         """The verdict on a skeleton, whose prefix is feasible, without the goals' places."""
-        return self._first_feasible(self._programs(skeleton, self._early), prefix)
+        programs = self._programs(skeleton, self._early)
+        return self._first_feasible(programs, prefix, self._restarts)
 
-    def _first_feasible(self, programs: Programs, prefix: CoarseSolution | None) -> CoarseSolution:
+    def _first_feasible(
+        self, programs: Programs, prefix: CoarseSolution | None, starts: int
+    ) -> CoarseSolution:
         """Start after start until one leads to a verified solution, unless a fact forbids it.
 
         A fact that has to be proved first is worth its time when the first start has failed.
         """
         skeleton, failures = programs.skeleton, list[Failure]()
         fact = self.facts.known(skeleton)
-        for number in range(self._restarts):
+        for number in range(starts):
             if number == 1:
                 fact = self.facts.impossible(skeleton)
             if fact:
@@ -161,8 +164,8 @@ class CoarseBound:
             failures.append(result.failure)
         # the prefix is feasible: what fails late in the skeleton tells more
         failure = min(failures, key=lambda failure: (-failure.action, failure.violation))
-        failure = replace(failure, tried=f"{self._restarts} starts of the coarse bound")
-        return CoarseSolution(skeleton, feasible=False, failure=failure, restarts=self._restarts)
+        failure = replace(failure, tried=f"{starts} starts of the coarse bound")
+        return CoarseSolution(skeleton, feasible=False, failure=failure, restarts=starts)
 
     def _restart(
         self, programs: Programs, number: int, prefix: CoarseSolution | None

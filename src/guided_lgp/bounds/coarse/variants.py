@@ -44,6 +44,14 @@ class Variants:
         self._sides = [_side_count(geometry, arms.get(ground.parent), ground) for ground in grounds]
         self._low = list(_way_counts(geometry, grounds))
 
+    def starts(self, least: int) -> int:
+        """How many starts try one choice after the other until all have met, or the least number.
+
+        Where places are given, a grip can do what another one cannot at both ends of its way.
+        """
+        turns = int(np.lcm.reduce([1, *self._sides])) * max(self._low, default=1)
+        return max(least, min(2 * turns, _MOST_STARTS))
+
     def tried(self, number: int, generator: np.random.Generator, kept: Variant) -> Variant:
         """What a start chooses.
 
@@ -59,6 +67,10 @@ class Variants:
         turn //= max(new, default=1)
         low = tuple(turn % count for count in self._low[len(kept.low) :])
         return Variant(kept.sides + sides, kept.low + low)
+
+
+_MOST_STARTS = 60
+"""Three actions' grips may be five, five and three, and two of the ways low: a second or two."""
 
 
 def _drawn(generator: np.random.Generator, counts: Sequence[int]) -> tuple[int, ...]:
