@@ -2,6 +2,7 @@ import re
 from itertools import combinations
 from pathlib import Path
 from threading import Event, Thread
+from types import SimpleNamespace
 from urllib.request import urlopen
 
 import numpy as np
@@ -16,7 +17,7 @@ from guided_lgp.scene import Scene, generate
 from guided_lgp.scene.bodies import COLOURS
 from guided_lgp.view import motion
 from guided_lgp.view.bodies import box_colours
-from guided_lgp.view.live import view
+from guided_lgp.view.live import _show_whole_robot, view
 from guided_lgp.view.motion import frames, play, steps
 from guided_lgp.view.replay import replay_html
 from guided_lgp.view.viewer import Viewer
@@ -115,6 +116,13 @@ def spans(scene: Scene, trajectory: Trajectory, *hands: str) -> list[tuple[float
     listed = steps(scene, skeleton, trajectory)
     assert tuple(step.action for step in listed) == skeleton
     return [(round(step.time, 3), round(step.end, 3)) for step in listed]
+
+
+@pytest.mark.parametrize(("aspect", "fov"), [(1.6, 0.75), (1.0, 0.75), (0.5, 1.33)])
+def test_a_telephone_shows_the_whole_robot(aspect: float, fov: float) -> None:
+    camera = SimpleNamespace(aspect=aspect, fov=0.75)
+    _show_whole_robot(SimpleNamespace(camera=camera))
+    assert camera.fov == pytest.approx(fov, abs=0.01)
 
 
 def test_steps_follow_each_other_or_overlap(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:

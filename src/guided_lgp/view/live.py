@@ -13,7 +13,7 @@ from guided_lgp.logic import Objective, Skeleton, format_objective
 from guided_lgp.scene.model import Scene
 from guided_lgp.scene.world import initial_poses
 from guided_lgp.view.motion import FRAME_RATE, Frame, Step, frames, show, steps
-from guided_lgp.view.viewer import Viewer
+from guided_lgp.view.viewer import FIELD_OF_VIEW, Viewer
 
 _SPEEDS = ("0.5", "1", "2", "4")
 
@@ -41,6 +41,7 @@ def view(
     """
     stop = stop or Event()
     with Viewer(scene, port) as viewer, suppress(KeyboardInterrupt):
+        viewer.server.on_client_connect(_show_whole_robot)
         for name, placement in initial_poses(scene).items():  # also of what is in a hand
             viewer.move_box(name, placement)
         player = None
@@ -51,6 +52,13 @@ def view(
         while not stop.wait(1.0 / FRAME_RATE):
             if player is not None:
                 player.tick(1.0 / FRAME_RATE)
+
+
+def _show_whole_robot(client: Any) -> None:
+    """On a screen higher than wide the angle of view grows until the arms are in the picture."""
+    camera = client.camera
+    if camera.aspect < 1.0:
+        camera.fov = 2.0 * float(np.arctan(np.tan(FIELD_OF_VIEW / 2.0) / camera.aspect))
 
 
 class _Player:
