@@ -1,6 +1,6 @@
 """Convex shapes in coal: of a robot's links, and of bodies."""
 
-import pickle
+import json
 import xml.etree.ElementTree as ET
 from functools import cache
 from hashlib import sha256
@@ -14,6 +14,12 @@ import pinocchio as pin
 from guided_lgp.bounds.results import Array
 from guided_lgp.cache import made
 from guided_lgp.scene.shapes import Convex
+
+_KINDS = {
+    kind.__name__: kind
+    for kind in (coal.Convex, coal.Box, coal.Cylinder, coal.Capsule, coal.Sphere)
+}
+"""The shapes that a link may have, meshes as convex hulls."""
 
 
 class LinkShape(NamedTuple):
@@ -34,13 +40,24 @@ def robot_shapes(urdf: Path) -> tuple[LinkShape, ...]:
     files = (Path(mesh.get("filename", "")) for mesh in meshes)
     versions = f"{pin.__version__} {coal.__version__}".encode()
     digest = sha256(b"".join((versions, *(sha256(f.read_bytes()).digest() for f in files))))
-    name = f"{urdf.stem}.{digest.hexdigest()[:16]}.shapes"  # the stem has the URDF's own digest
-    file = made(name, lambda _: pickle.dumps(_made(urdf)))
+    # What is in the URDF itself is in its name.
+    name = f"{urdf.stem}.{digest.hexdigest()[:16]}.shapes.json"
+    file = made(name, lambda _: json.dumps(_written(urdf)).encode())
     assert file is not None  # there is always something to write
-    return tuple(LinkShape(*entry) for entry in pickle.loads(file.read_bytes()))
+    return tuple(
+        LinkShape(link, joint, np.array(pose), _read(kind, text))
+        for link, joint, pose, kind, text in json.loads(file.read_bytes())
+    )
 
 
-def _made(urdf: Path) -> list[tuple[Any, ...]]:
+def _read(kind: str, text: str) -> Any:
+    shape = _KINDS[kind]()
+    shape.loadFromString(text)
+    return shape
+
+
+def _written(urdf: Path) -> list[tuple[Any, ...]]:
+    """Link, joint, pose, kind and what coal writes of every shape."""
     model = pin.buildModelFromUrdf(str(urdf))
     geometry = pin.buildGeomFromUrdf(model, str(urdf), pin.GeometryType.COLLISION)
     found = []
@@ -50,7 +67,8 @@ def _made(urdf: Path) -> list[tuple[Any, ...]]:
             shape.buildConvexHull(True, "Qt")
             shape = shape.convex
         link = body.name[: body.name.rindex("_")]
-        found.append((link, body.parentJoint, body.placement.homogeneous, shape))
+        pose, kind = body.placement.homogeneous.tolist(), type(shape).__name__
+        found.append((link, body.parentJoint, pose, kind, shape.saveToString()))
     return found
 
 
