@@ -30,7 +30,7 @@ def load_robot(name: str) -> Robot:
         return read_robot(_FOLDER / f"{name}.yaml")
     if not name.endswith(".yaml"):
         accepted = f"{', '.join(robot_names())}, or the path of a robot file (.yaml)"
-        raise InputError("robot", f"unknown robot {name!r}", accepted)
+        raise InputError("model", f"unknown robot {name!r}", accepted)
     return read_robot(Path(name).resolve())
 
 

@@ -17,15 +17,13 @@ from guided_lgp.robots.robot import Fingers
 TICK = 0.025
 """Time (s) between two rows: so little that a smooth curve through them, as controllers follow it,
 stays within a millimetre of the straight lines between them."""
-_WINDOWS = (2, 3, 4)
-"""Ticks over which configurations may be averaged: a jump by a whole acceleration limit needs the
-first, one from limit to limit the last."""
+_WINDOWS = (4, 3, 2)
+"""Ticks over which configurations may be averaged: a jump from one acceleration limit to the other
+needs the first, which is the best most often; one by a single limit needs the last."""
 _FINE = 2
 """Samples per tick that are averaged."""
 _SHARE = 0.99
 """Share of the limits that is used, so that the rounded rows keep them too."""
-_SMOOTHER = 0.85
-"""Share of the fastest law's time that is tried first: means do not reach its peaks."""
 _FINGER_SHARE = 0.97
 """Share of their velocity limit at which fingers move."""
 
@@ -44,19 +42,26 @@ def jerk_limited(path: Array, arm: Arm, slower: float = 1.0) -> Array:
     law = fastest_law(path, arm, _SHARE)
     if law.duration == 0.0:
         return law.path
-    return min((_followed(law, arm, slower, window) for window in _WINDOWS), key=len)
+    fewest = _followed(law, arm, slower, _WINDOWS[0])
+    for window in _WINDOWS[1:]:
+        fewest = _followed(law, arm, slower, window, fewest)
+    return fewest
 
 
-def _followed(law: Law, arm: Arm, slower: float, window: int) -> Array:
-    """The fewest rows of a law, averaged over some ticks, that keep the limits."""
-    shortest = slower * law.duration
-    ticks = int(np.ceil(_SMOOTHER * shortest / TICK - 1e-9)) + window
-    while True:
+def _followed(
+    law: Law, arm: Arm, slower: float, window: int, otherwise: Array | None = None
+) -> Array:
+    """The fewest rows of a law, averaged over some ticks, that keep the limits; or others (T, n),
+    if these are as few.
+    """
+    ticks = int(np.ceil(slower * law.duration / TICK)) + window
+    while otherwise is None or ticks < len(otherwise) - 1:
         rows = _averaged(law, ticks, window)
         excess = _excess(rows, arm, slower)
         if excess <= 1.0:
             return rows
         ticks = max(ticks + 1, int(excess * ticks) - 1)
+    return otherwise
 
 
 def ramp(fingers: Fingers, start: float, end: float) -> Array:
@@ -65,27 +70,31 @@ def ramp(fingers: Fingers, start: float, end: float) -> Array:
     moving = int(np.ceil(duration / TICK - 1e-9))
     if moving == 0:
         return np.array([start])
-    window = _WINDOWS[0]
-    fine = np.clip(_window_times(moving + window, window) / (moving * TICK), 0.0, 1.0)
-    values = np.asarray(start + (end - start) * fine.mean(axis=1))
+    shares = _fine_times(moving + _WINDOWS[-1], _WINDOWS[-1]) / (moving * TICK)
+    values = start + (end - start) * _means(np.clip(shares, 0.0, 1.0)[:, None], _WINDOWS[-1])[:, 0]
     values[-1] = end
-    return values
-
-
-def _window_times(ticks: int, window: int) -> Array:
-    """Times (ticks + 1, samples) in the window of every row, before the first one below zero."""
-    within = TICK * ((np.arange(window * _FINE) + 0.5) / _FINE - window)
-    return np.asarray(TICK * np.arange(ticks + 1)[:, None] + within)
+    return np.asarray(values)
 
 
 def _averaged(law: Law, ticks: int, window: int) -> Array:
     """Means (ticks + 1, n) over the window of every row of a law that is followed slower."""
     slower = (ticks - window) * TICK / law.duration
-    times = np.clip(_window_times(ticks, window) / slower, 0.0, law.duration)
-    places, where = np.unique(times, return_inverse=True)
-    rows = law(places)[where.reshape(times.shape)].mean(axis=1)
+    times = np.clip(_fine_times(ticks, window) / slower, 0.0, law.duration)
+    rows = _means(law(times), window)
     rows[0], rows[-1] = law.path[0], law.path[-1]
-    return np.asarray(rows)
+    return rows
+
+
+def _fine_times(ticks: int, window: int) -> Array:
+    """Times at which rows are sampled, from the first row's window on, which is before zero."""
+    return np.asarray(TICK / _FINE * (np.arange((ticks + window) * _FINE) + 0.5) - window * TICK)
+
+
+def _means(samples: Array, window: int) -> Array:
+    """Means (ticks + 1, n) of samples (m, n) over the window before every tick."""
+    sums = np.cumsum(np.pad(samples, ((1, 0), (0, 0))), axis=0)
+    wide = window * _FINE
+    return np.asarray((sums[wide::_FINE] - sums[:-wide:_FINE]) / wide)
 
 
 def _excess(rows: Array, arm: Arm, slower: float) -> float:

@@ -95,7 +95,6 @@ class OffsetShoulder:
     ) -> tuple[Array, NDArray[np.bool_]]:
         """The same without a compiler, for all poses at once."""
         upper, fore, hand = self._lengths.upper, self._lengths.fore, self._lengths.hand
-        limits = self._limits
         rot = self._mirror @ rotation @ self._mirror
         wrist = (position - self.shoulder) @ self._mirror - hand * rot[..., :, 0]
         pan = redundancy * self._signs[0]
@@ -117,28 +116,24 @@ class OffsetShoulder:
         for side, (roll_, height_) in enumerate(((roll, height), (np.pi - roll, -height))):
             q[..., side, 1] = np.arctan2(height_ * x - along * z, along * x + height_ * z)
             q[..., side, 2] = roll_
-        sin2, cos2 = np.sin(q[..., 1]), np.cos(q[..., 1])
-        sin3_, cos3 = np.sin(q[..., 2]), np.cos(q[..., 2])
         # Rotation left for the wrist, R_36 = (R_z R_y R_x R_y)^T R, row by row.
-        r1 = (cos1[..., None] * rot[..., 0, :] + sin1[..., None] * rot[..., 1, :])[..., None, :]
-        r2 = (cos1[..., None] * rot[..., 1, :] - sin1[..., None] * rot[..., 0, :])[..., None, :]
-        r3 = rot[..., None, 2, :]
-        s1 = cos2[..., None] * r1 - sin2[..., None] * r3
-        s3 = sin2[..., None] * r1 + cos2[..., None] * r3
-        t2 = cos3[..., None] * r2 + sin3_[..., None] * s3
-        t3 = cos3[..., None] * s3 - sin3_[..., None] * r2
-        c4, s4 = cos4[..., None, None], sin4[..., None, None]
-        u1 = c4 * s1 - s4 * t3
-        u3 = s4 * s1 + c4 * t3
+        rows = _turned_back(rot[..., 0, :], rot[..., 1, :], cos1, sin1)
+        r1, r2, r3 = (row[..., None, :] for row in (*rows, rot[..., 2, :]))
+        s3, s1 = _turned_back(r3, r1, np.cos(q[..., 1]), np.sin(q[..., 1]))
+        t2, t3 = _turned_back(r2, s3, np.cos(q[..., 2]), np.sin(q[..., 2]))
+        u3, u1 = _turned_back(t3, s1, cos4[..., None], sin4[..., None])
         q[..., 4] = np.arctan2(-t2[..., 0], u3[..., 0])
         q[..., 5] = -np.arccos(np.clip(u1[..., 0], -1.0, 1.0))
         q[..., 6] = np.arctan2(-u1[..., 1], -u1[..., 2])
-        # The upper arm roll's range is wider than a turn's half: shift into it.
+        return q * self._signs, self._shifted_inside(q) & reachable[..., None]
+
+    def _shifted_inside(self, q: Array) -> NDArray[np.bool_]:
+        """Shift roll and lift by full turns into their ranges; which of q (..., 7) are inside."""
+        limits = self._limits
         q[..., 2] += np.where(q[..., 2] < limits[2, 0], _TURN, 0.0)
         q[..., 2] -= np.where(q[..., 2] > limits[2, 1], _TURN, 0.0)
         q[..., 1] = (q[..., 1] + np.pi) % _TURN - np.pi
-        inside = np.all((q > limits[:, 0]) & (q < limits[:, 1]), axis=-1)
-        return q * self._signs, inside & reachable[..., None]
+        return np.asarray(np.all((q > limits[:, 0]) & (q < limits[:, 1]), axis=-1))
 
     def follow(self, q: Array, valid: NDArray[np.bool_], branch: int) -> Array | None:
         """The solutions along a path as one motion on a side of the elbow.
@@ -204,6 +199,12 @@ def _turn(frame: Array, axis: int, cosine: Array, sine: Array) -> Array:
     turned[..., :, first] = c * frame[..., :, first] + s * frame[..., :, second]
     turned[..., :, second] = c * frame[..., :, second] - s * frame[..., :, first]
     return turned
+
+
+def _turned_back(first: Array, second: Array, cosine: Array, sine: Array) -> tuple[Array, Array]:
+    """Two rows (..., 3) of a rotation, turned back by an angle (...,) in their plane."""
+    c, s = cosine[..., None], sine[..., None]
+    return c * first + s * second, c * second - s * first
 
 
 @cache
