@@ -110,6 +110,15 @@ def test_into_a_low_shelf_from_wherever_the_box_stands(y: float, yaw: float, roo
     assert len(result.skeleton or ()) == 2, result.explanation
 
 
+def test_a_lid_no_wider_than_its_pot_is_too_wide_for_fingers() -> None:
+    scene = load_scene(CASES / "lid_on_pot.json")
+    pot, lid = scene.boxes
+    pot = pot.model_copy(update={"size": (0.22, 0.22, 0.12)})
+    result = plan(scene.model_copy(update={"boxes": (pot, lid)}), "(on lid right)")
+    assert (result.reason, result.coarse_calls) == ("impossible", 0)
+    assert result.explanation.startswith("lid is too wide for the fingers: 0.220 m")
+
+
 def test_a_plate_with_nothing_free_below_is_too_wide() -> None:
     scene = load_scene(CASES / "plate_at_edge.json")
     (plate,) = scene.boxes

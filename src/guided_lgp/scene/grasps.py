@@ -16,6 +16,9 @@ _PALM_GAP = 0.002
 _INSET = 0.003
 """How far (m) the point between the fingertips is inside the side that they press on, at least."""
 
+_ROUNDING = 1e-9
+"""By how much (m) lengths of a scene that should be the same may differ."""
+
 ROUND_TURNS = (math.pi / 4, math.pi / 8, 3 * math.pi / 8)
 """Turns (rad) about its axis by which a cylinder is taken, beside those of a box around it: between
 two of them, the side that a hand closes on is less than 12 degrees away."""
@@ -50,11 +53,14 @@ def is_held_flat(box: Box, bodies: Iterable[Body], widest: float) -> bool:
 
 
 def _juts_out(box: Box, below: Body) -> bool:
-    """Whether the box around a body is not all above what it stands on."""
+    """Whether a body is not all above what it stands on."""
+    radius, points = 0.0, footprint(box)
+    if box.shape == "cylinder":
+        radius, points = box.convex.half[0], np.array([box.position[:2]])
     if below.convex.shape == "cylinder":
-        away = np.linalg.norm(footprint(box) - below.position[:2], axis=1)
-        return bool(away.max() > below.convex.half[0])
-    return bool(inset(footprint(below), footprint(box)).min() < 0)
+        away = np.linalg.norm(points - below.position[:2], axis=1)
+        return bool(away.max() + radius > below.convex.half[0] + _ROUNDING)
+    return bool(inset(footprint(below), points).min() < radius - _ROUNDING)
 
 
 def grasp_at_start(box: Box, arm: Arm) -> tuple[float, ...]:

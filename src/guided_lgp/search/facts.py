@@ -105,7 +105,10 @@ class TaskFacts:
 
     def _proofs(self) -> Iterator[Finding]:
         for body, parents in self._moves():
-            if self._state.support_of(body) in self._symbols.surfaces:
+            still = self._state.support_of(body) in self._symbols.surfaces
+            if still or self._state.parent_of(body) not in parents:  # else others may carry it
+                yield from self._ungraspable(body)
+            if still:
                 yield from self._stuck(body)
             if self._denied(body, parents):
                 yield self._out_of_reach(" and ".join(sorted(parents)))
@@ -125,8 +128,10 @@ class TaskFacts:
         for body in self._misplaced:
             yield body, frozenset({self._state.parent_of(body)})
 
-    def _stuck(self, body: str) -> Iterator[Finding]:
-        """Why no arm can move a body from the furniture that it stands on."""
+    def _ungraspable(self, body: str) -> Iterator[Finding]:
+        """Why no hand closes on a body, unless one holds it already."""
+        if self._state.holder(body) is not None:
+            return
         narrowest, widest = min(self._boxes[body].grasp_widths), self._widest
         flat = any(
             is_held_flat(self._boxes[body], self.scene.bodies, arm.fingers.grasp_width)
@@ -140,6 +145,9 @@ class TaskFacts:
             )
         else:
             yield from untouchable(self._boxes[body], widest)
+
+    def _stuck(self, body: str) -> Iterator[Finding]:
+        """Why no arm can move a body from the furniture that it stands on."""
         takings = self._takings(body)
         if takings and all(map(self._cannot_take, takings)):
             yield self._out_of_reach(body)
