@@ -125,8 +125,33 @@ class Gap:
                 return Way((whole,), _straight(out), _straight(into))
         if wound.any():
             return None
-        pieces = tuple(path for path in (longest[0], *found, longest[1]) if len(path) > 1)
-        return Way(pieces, _straight(out), _straight(into))
+        return Way(
+            tuple(self._split(transit, longest[0], found, longest[1])),
+            _straight(out),
+            _straight(into),
+        )
+
+    def _split(
+        self, transit: Transit, out: Array, paths: Sequence[Array], into: Array
+    ) -> list[Array]:
+        """Straight ways, and free paths between them that cannot be one, as few: a rest is between
+        two.
+        """
+        if len(paths) == 1:
+            return [path for path in (out, *paths, into) if len(path) > 1]
+        half = len(paths) // 2
+        middle = paths[half][:1]
+        parts = (out, paths[:half], middle), (middle, paths[half:], into)
+        return [piece for part in parts for piece in self._fewest(transit, *part)]
+
+    def _fewest(
+        self, transit: Transit, out: Array, paths: Sequence[Array], into: Array
+    ) -> list[Array]:
+        """The same with free paths that may be one."""
+        path = optimal_path(self._mover, transit, np.concatenate(paths), *_lines(out, into))
+        if path is None:
+            return self._split(transit, out, paths, into)
+        return [np.concatenate([out, path[1:], into[1:]])]
 
     def _free(self, transit: Transit, lines: tuple[Array, Array], detour: Array) -> Array | None:
         """The best free path (m, n) between two straight ways, begun from the line between them or
@@ -134,9 +159,14 @@ class Gap:
         """
         line = np.linspace(detour[0], detour[-1], _GUESS)
         guesses = [detour] if transit.keep_level else [line, detour]
-        beside = [line if len(line) > 1 else None for line in lines]
+        beside = _lines(*lines)
         paths = (optimal_path(self._mover, transit, guess, *beside) for guess in guesses)
         return next((path for path in paths if path is not None), None)
+
+
+def _lines(*ways: Array) -> list[Array | None]:
+    """Those of some straight ways that are no single configuration."""
+    return [way if len(way) > 1 else None for way in ways]
 
 
 def _straight(way: Array) -> int:
