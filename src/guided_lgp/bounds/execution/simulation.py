@@ -11,8 +11,10 @@ from guided_lgp.bounds.verify.efforts import GRAVITY, own_weights
 from guided_lgp.scene.bullet import pybullet
 from guided_lgp.scene.world import World
 
-RATE = 480
-"""Simulation steps per second: at 120, a tower of eight boxes creeps 14 mm in 5 s, here 0.2 mm."""
+RATES = {"fixed": 480, "friction": 960}
+"""Simulation steps per second, by the grip. At 120, a tower of eight boxes creeps 14 mm in 5 s, at
+480 it does 0.2 mm; what fingertips press on creeps out of the hand at 480, by 3 mm per s of motion.
+"""
 ITERATIONS = 150
 """Of the contact solver, in each step."""
 SETTLE_S = 1.0
@@ -37,17 +39,20 @@ class Simulation:
         self.world = world
         self._client = world.client
         self._robot = world.scene.robot.description
+        self._rate = RATES[conditions.grip]
         self._squeezing: dict[str, float] = {}
         pybullet.setGravity(0, 0, -GRAVITY, physicsClientId=self._client)
         pybullet.setPhysicsEngineParameter(
-            fixedTimeStep=1 / RATE, numSolverIterations=ITERATIONS, physicsClientId=self._client
+            fixedTimeStep=1 / self._rate,
+            numSolverIterations=ITERATIONS,
+            physicsClientId=self._client,
         )
         self._rub(float(np.sqrt(conditions.friction)))
         self._hold_other_joints()
 
     def load(self, trajectory: Trajectory) -> None:
         """Get ready to follow a motion from its start."""
-        moments = np.arange(int(np.ceil(trajectory.times[-1] * RATE)) + 1) / RATE
+        moments = np.arange(int(np.ceil(trajectory.times[-1] * self._rate)) + 1) / self._rate
         values = trajectory.joints(self._robot.moving_joints)
         self._targets = np.stack(
             [np.interp(moments, trajectory.times, joint) for joint in values.T], axis=1
@@ -58,13 +63,13 @@ class Simulation:
 
     def follow(self, time: float) -> None:
         """Drive the joints along the motion until a moment (s)."""
-        while self._step < min(round(time * RATE), len(self._targets) - 1):
+        while self._step < min(round(time * self._rate), len(self._targets) - 1):
             self._step += 1
-            self._drive((self._targets[self._step] - self._targets[self._step - 1]) * RATE)
+            self._drive((self._targets[self._step] - self._targets[self._step - 1]) * self._rate)
 
     def rest(self, seconds: float) -> None:
         """Hold still for some time."""
-        for _ in range(int(seconds * RATE)):
+        for _ in range(int(seconds * self._rate)):
             self._drive(np.zeros(self._targets.shape[1]))
 
     def touch(self, links: Sequence[str], box: str, allowed: bool) -> None:
@@ -182,7 +187,7 @@ class Simulation:
         arms = len(self._robot.joint_names)
         efforts = np.minimum(self._robot.effort_limits, _STRONGEST)
         if self._robot.balanced:
-            sparse = self._targets[:: RATE // 10, :arms]
+            sparse = self._targets[:: self._rate // 10, :arms]
             efforts = efforts + np.abs(own_weights(self.world.scene, sparse)).max(axis=0)
         return np.concatenate([efforts, np.full(self._targets.shape[1] - arms, _FINGER_FORCE)])
 
