@@ -4,6 +4,7 @@ import inspect
 import json
 import re
 import textwrap
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -190,6 +191,18 @@ def test_an_example_takes_as_many_actions_as_the_readme_says(
 ) -> None:
     result = plan(EXAMPLES / name, re.findall(r"\(.*?\)", goals))
     assert len(result.skeleton or ()) == int(actions)
+
+
+def test_twenty_actions_are_moved_by_both_arms_at_once() -> None:
+    towers = (
+        ("red", "blue", "purple", "white", "pink", "tray"),
+        ("green", "yellow", "orange", "black", "brown", "tray"),
+    )
+    goals = [f"(on {upper} {lower})" for tower in towers for upper, lower in pairwise(tower)]
+    path = plan(EXAMPLES / "ten_boxes.json", goals).path
+    assert path is not None
+    assert path.trajectory is not None
+    assert path.trajectory.times[-1] < 30.0  # one arm after the other takes 48 s
 
 
 def test_the_docstring_of_the_package_runs(
