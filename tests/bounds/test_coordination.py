@@ -11,16 +11,20 @@ from guided_lgp.bounds.coordination import Coordinator
 from guided_lgp.bounds.coordination.itinerary import Itinerary, Stop, itinerary
 from guided_lgp.bounds.coordination.law import TICK, jerk_limited, ramp
 from guided_lgp.bounds.coordination.turns import best_turns
+from guided_lgp.bounds.deadline import NEVER
+from guided_lgp.bounds.execution import execute
 from guided_lgp.bounds.path.situation import situation_at_start
 from guided_lgp.bounds.results import PathResult, Trajectory
 from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.bounds.verify import verify_path
 from guided_lgp.bounds.verify.attachments import switches_of
 from guided_lgp.bounds.verify.joints import rows_outside_limits
+from guided_lgp.explanation import users_bounds
 from guided_lgp.logic import format_skeleton, parse_skeleton
 from guided_lgp.params import load_planning
 from guided_lgp.robots import PlacedArm, load_robot
 from guided_lgp.scene import Scene, load_scene
+from guided_lgp.scene.generate import generate
 from guided_lgp.scene.world import world_of
 
 PR2 = load_robot("pr2")
@@ -101,6 +105,16 @@ def test_the_hand_rests_while_its_fingers_are_near_the_body(
         assert not np.ptp(q[attachment.end : opened + 1, arm.slice], axis=0).any()
         assert np.ptp(q[closing - 2 : closing + 1, arm.slice], axis=0).any()
         assert np.ptp(q[opened : opened + 3, arm.slice], axis=0).any()
+
+
+def test_the_hand_comes_with_fingers_that_are_open() -> None:
+    """They open from the start on; not yet wide, one of them would push the box by 17 mm."""
+    (scene,) = generate("a", 1, 30_006, "execution-006").scenes
+    bounds = users_bounds(scene, load_planning().bounds, NEVER, (), coordinate=True)
+    skeleton = parse_skeleton("(grasp pr2R red) (place pr2R red green)")
+    report = execute(scene, (), skeleton, motion(bounds.path(skeleton)))
+    assert report.success, report.fault
+    assert report.drift < 0.002
 
 
 def test_the_same_plan_twice(apart: tuple[Scene, PathResult], together: PathResult) -> None:

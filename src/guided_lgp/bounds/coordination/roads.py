@@ -28,6 +28,9 @@ _SLOWER = 1.15
 _OFF = 0.004
 """Distance (m) of either finger from the body between them at which the hand may move; planning
 keeps 3 mm from everything."""
+_NEAR = 0.2
+"""How far (m of the arm's motion) from a straight way fingers are as open as it asks for: free ways
+are looked for with such fingers, and come within 3 mm of the body."""
 
 
 class Place(IntEnum):
@@ -177,9 +180,9 @@ class Road:
         slower = self._stops[end.stop].slower
         for _ in range(_PATIENCE):
             q = self._timed(way, slower)
-            free = self._between(way, q)
-            if free[1] - free[0] >= len(fingers[1]) - 1:
-                yield self._edge(node, end, *self._together(q, free, *fingers), needs)
+            free, away = self._between(way, q), self._between(way, q, _NEAR)
+            if away[1] - away[0] >= len(fingers[1]) - 1:
+                yield self._edge(node, end, *self._together(q, free, away[1], *fingers), needs)
                 return
             slower *= _SLOWER
 
@@ -193,17 +196,23 @@ class Road:
         return opening, between, closing
 
     def _together(
-        self, q: Array, free: tuple[int, int], opening: Array, between: Array, closing: Array
+        self,
+        q: Array,
+        free: tuple[int, int],
+        near: int,
+        opening: Array,
+        between: Array,
+        closing: Array,
     ) -> tuple[Array, Array]:
-        """Rows of the arm and of the fingers: they move on the free way; on the straight ways, and
-        before and after, they do so while the hand is at the body.
+        """Rows of the arm and of the fingers: they move on the free way, until the hand is near; on
+        the straight ways, and before and after, they do so while the hand is at the body.
         """
         first, last = free
         lead = len(opening) - 1 - min(self._clear(opening[::-1]), first)
         reached = lead + len(q) - 1 - min(self._clear(closing), len(q) - 1 - last)
         rest = reached + len(closing) - lead - len(q)
         values = _joined(
-            (0, opening), (lead + last - len(between) + 1, between), (reached, closing)
+            (0, opening), (lead + near - len(between) + 1, between), (reached, closing)
         )
         return np.pad(q, ((lead, rest), (0, 0)), mode="edge"), values
 
@@ -229,11 +238,15 @@ class Road:
         rows = np.concatenate([pieces[0], *(piece[1:] for piece in pieces[1:])])
         return rows if len(rows) > 1 else np.tile(rows, (2, 1))
 
-    def _between(self, way: Way, q: Array) -> tuple[int, int]:
-        """The first and the last row (of T, n) off the straight ways at the ends."""
+    def _between(self, way: Way, q: Array, farther: float = 0.0) -> tuple[int, int]:
+        """The first and the last row (of T, n) off the straight ways at the ends, or farther (m)
+        from them, but for what is left of a short way.
+        """
         gone, left = _lengths(q, self._arm), _lengths(q[::-1], self._arm)[::-1]
         out = _lengths(way.pieces[0][: way.out], self._arm)[-1:].sum()
         into = _lengths(way.pieces[-1][len(way.pieces[-1]) - way.into :], self._arm)[-1:].sum()
+        farther = min(farther, max(gone[-1] - out - into, 0.0) / 3)
+        out, into = (length and length + farther for length in (out, into))
         return int(np.argmax(gone >= out)), len(q) - 1 - int(np.argmax(left[::-1] >= into))
 
     def _opening(self, node: Node) -> Edge:
