@@ -4,10 +4,11 @@ Placements are drawn anywhere on their supports; the path bound, which samples g
 and knows nothing of the coarse bound's program and solver, looks for the whole verified motion. One
 that it finds is a witness against the verdict. Sequences end at the action that is denied:
 
-    python benchmarks/witness.py [first scene [scenes]]
+    python benchmarks/witness.py [sequences]
 """
 
 import json
+import logging
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -28,11 +29,16 @@ from guided_lgp.scene import Scene
 from guided_lgp.scene.generate import generate
 from guided_lgp.scene.world import initial_poses
 
+logger = logging.getLogger("benchmarks")
 PARAMETERS = load_params(SOURCES / "params.yaml")
 SEED = 20_005
 """Of scenes, sequences and placements; no stage of the pipeline uses it."""
-SCENES, PER_SCENE = 60, 10
-"""How many scenes, and denied sequences of each."""
+WANTED, PER_SCENE = 600, 10
+"""How many denied sequences at least, and of each scene at most."""
+WALKS = 300
+"""Sequences drawn in a scene: in some, hardly any is denied."""
+BATCH = 12
+"""Scenes that are searched before it is asked whether these were enough."""
 LONGEST = 3
 DRAWS = 1
 """Of all placements per sequence."""
@@ -40,13 +46,18 @@ INSET = 0.01
 """Distance (m) of a box's centre from the edge of its support."""
 
 
-def measure(first: int = 0, count: int = SCENES) -> dict[str, Any]:
+def measure(wanted: int = WANTED) -> dict[str, Any]:
     """How many denied sequences were searched, and which of them have a witness."""
-    scenes = generate("a", first + count, SEED, "witness").scenes
-    tasks = [Task(scene, number) for number, scene in enumerate(scenes)][first:]
-    parts = parallel.run(run_task, tasks, PARAMETERS.parallel, "witnesses against no")
-    found = [witness for part in parts for witness in part]
-    return {"n": count * PER_SCENE, "found": len(found), "witnesses": found}
+    scenes = generate("a", wanted, SEED, "witness").scenes
+    tasks = [Task(scene, number) for number, scene in enumerate(scenes)]
+    searched: list[tuple[str, bool]] = []
+    while tasks and len(searched) < wanted:
+        batch, tasks = tasks[:BATCH], tasks[BATCH:]
+        for part in parallel.run(run_task, batch, PARAMETERS.parallel, "witnesses against no"):
+            searched += part
+        logger.info("%d of %d denied sequences searched", len(searched), wanted)
+    found = [name for name, witnessed in searched if witnessed]
+    return {"n": len(searched), "found": len(found), "witnesses": found}
 
 
 @dataclass(frozen=True)
@@ -57,21 +68,23 @@ class Task:
     number: int
 
 
-def run_task(task: Task) -> list[str]:
-    """The denied sequences of a scene that have a witness."""
+def run_task(task: Task) -> list[tuple[str, bool]]:
+    """Denied sequences of a scene, and whether there is a witness against each."""
     rng = np.random.default_rng([SEED, task.number])
     path = PathBound(task.scene, CoarseBound(task.scene, 1), solutions=1)
     return [
-        f"{task.scene.name}: {' '.join(map(str, skeleton))}"
+        (
+            f"{task.scene.name}: {' '.join(map(str, skeleton))}",
+            any(path.solve(_drawn(task.scene, skeleton, rng)).feasible for _ in range(DRAWS)),
+        )
         for skeleton in _denied(task.scene, rng)
-        if any(path.solve(_drawn(task.scene, skeleton, rng)).feasible for _ in range(DRAWS))
     ]
 
 
 def _denied(scene: Scene, rng: np.random.Generator) -> Iterator[Skeleton]:
     """Different random sequences whose last action is denied, and no earlier one."""
     bounds, seen = SceneBounds(scene, PARAMETERS.bounds), set()
-    while len(seen) < PER_SCENE:
+    for _ in range(WALKS):
         state, skeleton = scene.state, Skeleton()
         while len(skeleton) < LONGEST:
             actions = list(applicable_actions(state, scene.symbols))
@@ -82,6 +95,8 @@ def _denied(scene: Scene, rng: np.random.Generator) -> Iterator[Skeleton]:
                     seen.add(skeleton)
                     yield skeleton
                 break
+        if len(seen) == PER_SCENE:
+            return
 
 
 def _drawn(scene: Scene, skeleton: Skeleton, rng: np.random.Generator) -> CoarseResult:
