@@ -13,6 +13,8 @@ import sys
 import tempfile
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from importlib import import_module
+from itertools import zip_longest
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -96,6 +98,22 @@ HOUSES = {
 }
 """Folders that are searched for declarations; they are listed file by file."""
 
+_LIBRARIES = (
+    "casadi",
+    "coal",
+    "joblib",
+    "matplotlib.pyplot",
+    "numpy",
+    "pandas",
+    "pinocchio",
+    "pyarrow.parquet",
+    "pydantic",
+    "torch",
+)
+"""What takes long to load, none of it of the package."""
+_FOUND = "found: "
+"""What a line with the files of a stage begins with."""
+
 _NETWORK = {
     "layers": 1,
     "nodes": 8,
@@ -137,17 +155,38 @@ def write_tiny_parameters(root: Path) -> None:
 
 
 def run_all(root: Path) -> Iterator[tuple[Stage, frozenset[Path]]]:
-    """Run every stage in an empty folder, each in a process of its own; the sources of each."""
+    """Run every stage in an empty folder, each in a process of its own; the sources of each.
+
+    These processes are forks of one that has loaded the libraries, and nothing of the package.
+    """
     write_tiny_parameters(root)
     for file in (PIPELINE, STUDIES, CASES):
         (root / file).parent.mkdir(exist_ok=True)
         (root / file).write_bytes((ROOT / file).read_bytes())
-    for stage, calls in RUNS.items():
-        command = [sys.executable, __file__, json.dumps(calls)]
-        done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=False)
-        if done.returncode:
+    command = [sys.executable, __file__, json.dumps(list(RUNS.values()))]
+    done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=False)
+    lines = [line.removeprefix(_FOUND) for line in done.stdout.splitlines() if _FOUND in line]
+    for stage, line in zip_longest(RUNS, lines):
+        if line is None:
             raise RuntimeError(f"{stage}: {done.stderr}")
-        yield stage, _of_the_package(json.loads(done.stdout.splitlines()[-1]), UNUSED.get(stage))
+        yield stage, _of_the_package(json.loads(line), UNUSED.get(stage))
+
+
+def fork_for_each(runs: Sequence[Sequence[Call]]) -> int:
+    """Run stages one after the other, each in a fork; 1 as soon as one of them fails."""
+    for name in _LIBRARIES:
+        import_module(name)
+    for calls in runs:
+        process = get_context("fork").Process(target=_say_what_is_used, args=(calls,))
+        process.start()
+        process.join()
+        if process.exitcode:
+            return 1
+    return 0
+
+
+def _say_what_is_used(calls: Sequence[Call]) -> None:
+    print(f"{_FOUND}{json.dumps(sorted(run_noting(calls)))}", flush=True)
 
 
 def run_noting(calls: Iterable[Call]) -> set[str]:
@@ -237,8 +276,7 @@ def write_lists(found: Mapping[Stage, Collection[Path]]) -> None:
 
 if __name__ == "__main__":
     if len(sys.argv) > 1:
-        used = run_noting(json.loads(sys.argv[1]))
-        print(json.dumps(sorted(used)))
+        sys.exit(fork_for_each(json.loads(sys.argv[1])))
     else:
         with tempfile.TemporaryDirectory() as folder:
             write_lists(dict(run_all(Path(folder))))
