@@ -59,7 +59,7 @@ cases: setup
 	python -m guided_lgp.report.pages
 
 test: lint
-	pytest -n auto --dist loadfile
+	pytest -n auto --dist loadfile --no-loadscope-reorder
 
 lint: setup
 	ruff format --check .

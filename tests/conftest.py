@@ -1,4 +1,4 @@
-"""What tests in several folders use: a Dask cluster whose workers can be killed."""
+"""The order of files, and a Dask cluster whose workers can be killed."""
 
 import os
 import subprocess
@@ -8,6 +8,23 @@ from pathlib import Path
 
 import pytest
 from dask.distributed import LocalCluster
+
+LONGEST = (
+    "test_pipeline.py",
+    "test_stage_sources.py",
+    "test_cases.py",
+    "test_documentation.py",
+    "test_hostile.py",
+    "test_plans.py",
+    "test_interruption.py",
+)
+"""What takes longest comes first, so that no worker is left alone with it at the end."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with the longest files."""
+    ranks = {name: rank for rank, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: ranks.get(item.path.name, len(ranks)))
 
 
 @pytest.fixture

@@ -1,3 +1,5 @@
+import fcntl
+import os
 from pathlib import Path
 
 import outputs
@@ -16,10 +18,17 @@ def params() -> Params:
 
 @pytest.fixture(scope="session")
 def rendered(tmp_path_factory: pytest.TempPathFactory, params: Params) -> Path:
-    """A folder with made-up outputs of all stages, rendered."""
-    root = tmp_path_factory.mktemp("rendered")
-    outputs.write_outputs(root)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(render, "SceneBounds", outputs.Bounds)
-        render.run(params, root)
+    """A folder with made-up outputs of all stages, rendered; for all workers of a run."""
+    folder = tmp_path_factory.getbasetemp()
+    folder = folder.parent if "PYTEST_XDIST_WORKER" in os.environ else folder
+    root = folder / "rendered"
+    with (folder / "rendered.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not root.exists():
+            unfinished = tmp_path_factory.mktemp("unfinished")
+            outputs.write_outputs(unfinished)
+            with pytest.MonkeyPatch.context() as patch:
+                patch.setattr(render, "SceneBounds", outputs.Bounds)
+                render.run(params, unfinished)
+            unfinished.rename(root)
     return root
