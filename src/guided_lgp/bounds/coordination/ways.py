@@ -14,9 +14,8 @@ from guided_lgp.robots import PlacedArm
 
 _GUESS = 12
 """Configurations of a straight line in joint space from which a path is optimised."""
-_LEG = 3
-"""Steps (of about a centimetre) that a hand goes straight at least, off a contact or to one. With
-two, fingers of motors that lag behind knocked against the box in 4 of 26 plans."""
+_LEG = 2
+"""Steps (of about a centimetre) that a hand goes straight at least, off a contact or to one."""
 
 
 @dataclass(frozen=True)
