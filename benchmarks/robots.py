@@ -146,7 +146,7 @@ PARTS: Mapping[str, Part] = {
     "panda_2": Part(partial(draw, "panda"), 100),
     "panda_4": Part(partial(draw, "panda"), 100, length=4),
     "ur5_2": Part(partial(draw, "ur5"), 50),
-    "baxter_2": Part(partial(draw, "baxter"), 50),
+    "baxter_2": Part(partial(draw, "baxter"), 25),
     "handover": Part(handed_over, 40, length=3, instructions=("grasp", "take", "place")),
 }
 
