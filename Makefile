@@ -71,7 +71,7 @@ bench: setup
 	dvc repro -q generate_scenes
 	python benchmarks/run.py
 
-# 300 generated scenes of ten kinds, with and without a plan, whose truth is known: minutes.
+# 390 generated scenes of thirteen kinds, with and without a plan, whose truth is known: minutes.
 open-world: setup
 	python benchmarks/open_world.py
 

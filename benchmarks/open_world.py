@@ -1,4 +1,4 @@
-"""Benchmark of the open world: generated scenes of ten kinds, their truth, and the verdicts.
+"""Benchmark of the open world: generated scenes of thirteen kinds, their truth, and the verdicts.
 
 A scene with a planted fault has no plan; another one is solvable if there is a witness that the
 plan checker of the tests accepts: the plan of the default planner, or else that of a search with
@@ -6,7 +6,7 @@ more patience. What has neither is undecided. Limits are coarse calls, so that a
 changes nothing; times stand apart. Writes ``reports/metrics/open_world.json`` and
 ``open_world_times.json``, and the table of ``docs/open_world.md``:
 
-    python benchmarks/open_world.py [scenes of each kind [first scene]]
+    python benchmarks/open_world.py [scenes of each kind [first scene [kind ...]]]
 """
 
 import json
@@ -160,9 +160,9 @@ def write_table(begin: str, text: str) -> None:
         unfinished.write_text(f"{before}{mark}\n\n{text}\n\n{end}{after}", "utf-8")
 
 
-def main(count: int = SCENES, first: int = 0) -> None:
-    """Plan scenes and add them to those of before, which stay where they have other numbers."""
-    tasks = [Task(kind, first + number) for kind in KINDS for number in range(count)]
+def main(count: int = SCENES, first: int = 0, *kinds: str) -> None:
+    """Plan scenes and add them to those of before, which stay where they are others."""
+    tasks = [Task(kind, first + number) for kind in kinds or KINDS for number in range(count)]
     settings = load_params(SOURCES / "params.yaml").parallel
     done = parallel.run(run_task, tasks, settings, "scenes of the open world")
     known = {(row["kind"], row["number"]): row for row in _before(FILE, "rows", [])}
@@ -184,4 +184,4 @@ def _before(name: str, field: str, otherwise: Known) -> Known:
 
 
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:]))
+    main(*map(int, sys.argv[1:3]), *sys.argv[3:])

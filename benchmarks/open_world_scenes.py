@@ -1,4 +1,4 @@
-"""Scenes of ten kinds that people's situations produce, two thirds of them meant to be solvable.
+"""Scenes of thirteen kinds that people's situations produce, two thirds meant to be solvable.
 
 Every third scene has one planted fault, which a proof that knows no planner confirms: lengths
 against the reach of an arm, widths against a hand, discs and heights against the room there is.
@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from guided_lgp.scene import Box, Scene, Table, parse_scene
+from guided_lgp.scene import Box, PlacedRobot, Scene, Table, parse_scene
 from guided_lgp.scene.bodies import Obstacle
 from guided_lgp.scene.footprints import footprint, gap
 
@@ -46,8 +46,8 @@ def cases(kind: str, number: int) -> Case:
     rng = np.random.default_rng([SEED, list(KINDS).index(kind), number])
     planted = number % FAULT == 0
     bodies, goals, fault = KINDS[kind](rng, planted)
-    tables, boxes, obstacles = (
-        [b for b in bodies if type(b) is wanted] for wanted in (Table, Box, Obstacle)
+    tables, boxes, obstacles, robots = (
+        [b for b in bodies if type(b) is wanted] for wanted in (Table, Box, Obstacle, PlacedRobot)
     )
     document = {
         "name": f"{kind}-{number}",
@@ -55,11 +55,13 @@ def cases(kind: str, number: int) -> Case:
         "boxes": [box.model_dump() for box in boxes],
         "obstacles": [obstacle.model_dump() for obstacle in obstacles],
     }
+    for robot in robots:
+        document["robot"] = robot.model_dump()
     scene = parse_scene(document, f"{kind}-{number}")
     return Case(kind, number, scene, goals, fault if planted else ())
 
 
-Drawn = tuple[list[Table | Box | Obstacle], tuple[str, ...], tuple[str, ...]]
+Drawn = tuple[list[Table | Box | Obstacle | PlacedRobot], tuple[str, ...], tuple[str, ...]]
 
 
 def _table(name: str, x: float, y: float, z: float = 0.6, yaw: float = 0.0) -> Table:
@@ -208,11 +210,65 @@ def hands(rng: Rng, planted: bool) -> Drawn:
     return bodies, goals, _out_of_reach(far) if planted else ()
 
 
+def lids(rng: Rng, planted: bool) -> Drawn:
+    left, right = _left_and_right()
+    width = rng.uniform(0.13, 0.16)
+    at = (rng.uniform(0.44, 0.52), rng.uniform(0.25, 0.35))
+    pot = _on(left, "pot", (width, width, 0.12), at, shape="cylinder")
+    wide = width if planted else width + rng.uniform(0.06, 0.08)
+    lid = _on(pot, "lid", (wide, wide, 0.02), at, shape="cylinder")
+    assert lid.size[0] > HAND  # and planted: no finger gets below it
+    return [left, right, pot, lid], ("(on lid right)",), ("width",) if planted else ()
+
+
+HOLDS_OUT = dict(
+    zip(
+        (
+            *("l_shoulder_pan_joint", "l_shoulder_lift_joint", "l_upper_arm_roll_joint"),
+            *("l_elbow_flex_joint", "l_forearm_roll_joint", "l_wrist_flex_joint"),
+            "l_wrist_roll_joint",
+        ),
+        (1.460348, 1.065283, 2.017675, -1.768497, -1.973801, -0.596159, 1.511368),
+        strict=True,
+    )
+)
+"""The left arm holds a tray level with its middle at (0.5, 0.3, 0.71), deep in the hand."""
+DEEP = (0.072, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+
+
+def carried(rng: Rng, planted: bool) -> Drawn:
+    left, right = _left_and_right()
+    size, far = (0.15, 0.07, 0.06), _table("far", 2.4, 0.0)
+    tray = Box.model_validate({"name": "tray", "size": size, "on": "pr2L", "grasp": DEEP})
+    cup = _on(left, "cup", size, at=(0.5 + rng.uniform(-0.03, 0.03), 0.3))
+    cup = cup.model_copy(update={"on": "tray", "position": (*cup.position[:2], 0.77)})
+    can = _on(right, "can", size, (0.5, -0.3), rng.uniform(-0.5, 0.5))
+    goals = ("(on tray right)", "(on cup right)", "(on can cup)", "(on tray can)")
+    goal = "(on tray far)" if planted else goals[rng.integers(len(goals))]
+    robot = PlacedRobot(joints=HOLDS_OUT)
+    bodies = [robot, left, right, far, tray, cup, can]
+    return bodies, (goal,), _out_of_reach(far) if planted else ()
+
+
+def swaps(rng: Rng, planted: bool) -> Drawn:
+    left, right = _left_and_right()
+    size = (0.13, 0.11, 0.1) if planted else (0.12, 0.06, 0.1)
+    turns = rng.uniform(-0.3, 0.3, 2)
+    a = _on(left, "a", size, (0.5, 0.25), float(turns[0]))
+    b = _on(left, "b", (0.12, 0.06, 0.1), (0.5, 0.42), float(turns[1]))
+    goals = tuple(
+        f"(at {one.name} left {other.position[0]} {other.position[1]} 0.65 {other.yaw:.3f})"
+        for one, other in ((a, b), (b, a))
+    )
+    return [left, right, a, b], goals, _too_wide(a) if planted else ()
+
+
 KINDS: Mapping[str, Callable[[Rng, bool], Drawn]] = {
     one.__name__: one
     for one in (
         *(shelves, rows, stacks, clutter, heights),
         *(turned, obstacles, shapes, small, hands),
+        *(lids, carried, swaps),
     )
 }
 """Every kind, by its name."""
