@@ -1,17 +1,20 @@
-"""Every robot that ships: a plan is found, verified and carried out."""
+"""Every robot that ships: a plan is found, verified, accepted by the checker, and carried out."""
 
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
+from plan_checker import check
 
 import guided_lgp.robots as robots_folder
 from guided_lgp.bounds.execution import execute
+from guided_lgp.bounds.plan_file import write_plan
 from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.bounds.verify import efforts
 from guided_lgp.bounds.verify.attachments import switches_of
 from guided_lgp.bounds.verify.joints import rows_outside_limits
+from guided_lgp.documents import read_json
 from guided_lgp.logic import Skeleton, parse_objective, parse_skeleton
 from guided_lgp.params import load_params
 from guided_lgp.paths import EXAMPLES, SOURCES
@@ -68,7 +71,7 @@ def scene(robot: str, base: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Sce
 
 
 @pytest.mark.parametrize("robot", robot_names())
-def test_a_plan_is_verified_and_carried_out(robot: str) -> None:
+def test_a_plan_is_verified_accepted_and_carried_out(robot: str, tmp_path: Path) -> None:
     assert robot in LAYOUTS, f"no layout in which the robot {robot} plans"
     placed, hand = scene(robot, base=(0.2, -0.1, 0.7)), LAYOUTS[robot].gripper
     validate_scene(placed)
@@ -80,6 +83,9 @@ def test_a_plan_is_verified_and_carried_out(robot: str) -> None:
     result = bounds.path(skeleton)
     assert result.trajectory is not None, result.failure
     goals = parse_objective(["(on green tab2)", "(on red green)"])
+    file = tmp_path / "plan.json"
+    write_plan(file, placed, goals, result, {})
+    assert check(read_json(file, "the plan")) == []
     assert execute(placed, goals, skeleton, result.trajectory).success
 
 

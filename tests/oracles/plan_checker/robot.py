@@ -4,6 +4,7 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Iterator
 from typing import Any
 
+import coal
 import numpy as np
 import pinocchio as pin
 from scipy.spatial import ConvexHull
@@ -93,8 +94,28 @@ def _vertices(item: Any) -> np.ndarray:
     shape = item.geometry
     if hasattr(shape, "halfSide"):
         return box_corners(2 * shape.halfSide)
+    if hasattr(shape, "radius"):
+        return _round(
+            shape.radius, getattr(shape, "halfLength", 0.0), isinstance(shape, coal.Cylinder)
+        )
     mesh = np.array([shape.vertex(index) for index in range(shape.num_vertices)])
     return mesh[ConvexHull(mesh).vertices]
+
+
+def _round(radius: float, half_length: float, flat: bool) -> np.ndarray:
+    """Vertices on a cylinder along z, or (not ``flat``) a capsule or sphere; faces 1 % inside."""
+    around = np.linspace(0, 2 * np.pi, 32, endpoint=False)
+    up = np.zeros(1) if flat else np.linspace(0, np.pi / 2, 9)
+    rings = radius * np.stack(
+        [
+            np.outer(np.cos(up), np.cos(around)),
+            np.outer(np.cos(up), np.sin(around)),
+            np.repeat(np.sin(up)[:, None], len(around), axis=1),
+        ],
+        axis=-1,
+    )
+    upper = rings.reshape(-1, 3) + np.array([0, 0, half_length])
+    return np.vstack([upper, upper * (1, 1, -1)])
 
 
 def wrong_start(plan: Plan) -> Iterator[Fault]:
