@@ -66,7 +66,10 @@ def serve(command: str, folder: Path) -> str:
         assert process.stdout is not None
         line = process.stdout.readline()
         process.send_signal(signal.SIGINT)
-        assert process.wait(60) == 0
+        try:
+            assert process.wait(60) == 0
+        finally:
+            process.kill()  # where signals are ignored, it would be waited for without end
     return line
 
 
