@@ -251,6 +251,27 @@ def test_carried_boxes_move_along(bound: CoarseBound) -> None:
     assert distances[0] == pytest.approx(distances[1], abs=1e-3)
 
 
+def test_what_is_put_on_top_balances_a_tower_of_ten() -> None:
+    """Eight boxes are 10 mm inside the edge of the lowest; the tenth goes to the other side."""
+    low = (0.15, 0.07, 0.05)
+    tower = [
+        Box(
+            name=f"b{level}",
+            size=low,
+            position=(0.50, 0.25 - 0.025 * (level > 0), 0.625 + 0.05 * level),
+            on=f"b{level - 1}" if level else "tab1",
+        )
+        for level in range(9)
+    ]
+    beside = Box(name="b9", size=low, position=(0.50, 0.45, 0.625), on="tab1")
+    high = Scene(tables=TABLES, boxes=(*tower, beside))
+    result = CoarseBound(high, 9).solve(parse_skeleton("(grasp pr2L b9) (place pr2L b9 b8)"))
+    _assert_true(high, result)
+    boxes = result.after_action[-1].boxes
+    middle = np.mean([boxes[f"b{level}"][1] for level in range(1, 10)])
+    assert middle - (0.25 - 0.035) > 0.0115
+
+
 @pytest.mark.parametrize("hands", [("pr2L", "pr2R"), ("pr2R", "pr2L")])
 def test_a_box_is_handed_over_and_put_down(hands: tuple[str, str]) -> None:
     scene = SCENE.model_copy(update={"domain": "handover"})

@@ -1,5 +1,7 @@
 """Every term's kernel against its check, which shares no code with it, on random configurations."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -120,7 +122,8 @@ def test_pads_of_a_cylinder_are_at_its_axis() -> None:
     assert excess[2] > 0.01
 
 
-def test_balanced() -> None:
+@pytest.mark.parametrize("name", balanced.SUMS)
+def test_balanced(name: str) -> None:
     rng, verdicts = np.random.default_rng(2), []
     sizes = {"red": SIZE, "green": (0.1, 0.06, 0.05), "blue": (0.05, 0.2, 0.2)}
     masses = np.array([np.prod(size) for size in sizes.values()])
@@ -128,10 +131,10 @@ def test_balanced() -> None:
     for _ in range(100):
         support = np.array([*rng.uniform(-0.5, 0.5, 2), rng.uniform(-3, 3)])
         points = support[:2] + rng.uniform(-0.12, 0.12, (3, 2))
-        unused = balanced.STACK - len(sizes)
+        unused = balanced.SUMS[name] - len(sizes)
         x = np.array([*support, *points.ravel(), *np.zeros(2 * unused)])
         shares = [*(masses / masses.sum()), *np.zeros(unused)]
-        rows = residual("balanced", x, np.array([*(half - BALANCE_INSET), *shares]))
+        rows = residual(name, x, np.array([*(half - BALANCE_INSET), *shares]))
         boxes = {n: pose((*p, 0.7)).tolist() for n, p in zip(sizes, points, strict=True)}
         on = {"red": "tab", "green": "red", "blue": "red"}
         top = Top(pose((*support[:2], 0.6), support[2]).tolist(), half, 0.6)
@@ -139,6 +142,16 @@ def test_balanced() -> None:
         assert excess == pytest.approx(-rows.min(), abs=1e-9)
         verdicts.append(excess < 0)
     both_verdicts(verdicts)
+
+
+@pytest.mark.parametrize(("middle", "inset"), [(0.1, 0.005), (0.25, 0.005), (0.5, 0.01)])
+def test_a_high_stack_keeps_farther_from_the_edge(middle: float, inset: float) -> None:
+    """As far as its middle goes to the side where it leans by 0.02; found there, it may stay."""
+    top = Top(pose((0.0, 0.0, 0.6)).tolist(), (0.1, 0.2), 0.6)
+    boxes = {"red": pose((0.1, 0.0, 0.6 + middle)).tolist()}
+    stack = partial(balanced.check, "red", boxes, {"red": 1.0}, {"red": "tab"}, top)
+    assert stack() == pytest.approx(inset)
+    assert stack(placed=False) == pytest.approx(0.0)
 
 
 def test_carried() -> None:

@@ -18,5 +18,6 @@ GRASP_OFFSET = 0.003
 GRASP_ANGLE = 0.03
 """... and its side (rad) off their closing direction; a given grasp may be half as far off."""
 BALANCE_INSET = 0.005
-"""How far (m) inside the support's top a centre of mass lies at least, where a plan puts it. In a
-scene, and as long as a stack stands as it did there, it has to be above the top and no more."""
+"""How far (m) inside the support's top a centre of mass lies at least, where a plan puts it; at
+least as far, too, as it goes to the side where all leans by ``LEVEL_ANGLE``. In a scene, and as
+long as a stack stands as it did there, it has to be above the top and no more."""

@@ -11,32 +11,41 @@ from guided_lgp.bounds.program.kernels import SCALE, Kernel, in_frame, kernel
 from guided_lgp.bounds.program.kinematics import RobotKinematics
 from guided_lgp.bounds.program.slots import ZERO
 from guided_lgp.bounds.terms.term import Term, put_down
-from guided_lgp.scene.tolerances import BALANCE_INSET
+from guided_lgp.scene.tolerances import BALANCE_INSET, LEVEL_ANGLE
 
-STACK = 8
-"""Most boxes in one sum of weights."""
+SUMS = {"balanced": 8, "balanced_tower": 32}
+"""Kernels, and most boxes in their sums of weights: a sum costs as much as it is long."""
 _LEAST = 1e-3
 """Half (m) of the area that is left on a support narrower than the margins."""
 
 
 def _kernels(robot: RobotKinematics) -> tuple[Kernel, ...]:
-    """The centre of mass of up to ``STACK`` boxes is inside the top of their support."""
-    x, p = ca.SX.sym("x", 3 + 2 * STACK), ca.SX.sym("p", 2 + STACK)
-    points = ca.reshape(x[3:], 2, STACK)
+    return tuple(_kernel(name, most) for name, most in SUMS.items())
+
+
+def _kernel(name: str, most: int) -> Kernel:
+    """The centre of mass of up to so many boxes is inside the top of their support."""
+    x, p = ca.SX.sym("x", 3 + 2 * most), ca.SX.sym("p", 2 + most)
+    points = ca.reshape(x[3:], 2, most)
     along, across = in_frame(x[2], ca.mtimes(points, p[2:]) - x[:2])
     c = ca.vertcat(p[0] - along, p[0] + along, p[1] - across, p[1] + across)
-    return (kernel("balanced", x, p, SCALE * c),)
+    return kernel(name, x, p, SCALE * c)
 
 
-def inner(context: Context, support: str) -> tuple[float, float]:
-    """Half extents (m) of the part of a support's top in which a centre of mass may be."""
-    (along, across), margin = context.geometry.bodies[support].rest, context.margins.balanced
+def inner(context: Context, support: str, height: float = 0.0) -> tuple[float, float]:
+    """Half extents (m) of the part of a support's top in which a centre of mass may be.
+
+    Of a stack of a height (m), the margin is at least as far as its top goes to the side where it
+    leans by what passes for level: twice what its middle does, which verification asks for.
+    """
+    along, across = context.geometry.bodies[support].rest
+    margin = max(context.margins.balanced, LEVEL_ANGLE * height)
     return max(along - margin, _LEAST), max(across - margin, _LEAST)
 
 
 def _add(context: Context, box: str, support: str) -> None:
     """Of the box with all that it carries, after the action, and of all that is below it."""
-    stack = (box, *context.after.carried_by(box))[:STACK]  # of higher towers, verification judges
+    stack = (box, *context.after.carried_by(box))[: max(SUMS.values())]  # verification judges all
     key = (support, *((name, context.pose[name].plane) for name in stack))
     if key not in context.balanced and any(context.pose[name].varies for name in stack):
         context.balanced.add(key)
@@ -47,16 +56,23 @@ def _add(context: Context, box: str, support: str) -> None:
 
 
 def _rows(context: Context, stack: tuple[str, ...], support: str) -> None:
+    kernel_name, most = next(sums for sums in SUMS.items() if sums[1] >= len(stack))
     masses = np.array([context.geometry.bodies[name].mass for name in stack])
-    shares = [*(masses / masses.sum()), *[0.0] * (STACK - len(stack))]
+    shares = [*(masses / masses.sum()), *[0.0] * (most - len(stack))]
     points = [slot for name in stack for slot in context.pose[name].plane[:2]]
-    points += [ZERO] * (2 * STACK - len(points))
+    points += [ZERO] * (2 * most - len(points))
     context.rows(
-        "balanced",
+        kernel_name,
         (*context.pose[support].plane, *points),
-        (*inner(context, support), *shares),
+        (*inner(context, support, _height(context, stack[0])), *shares),
         ("balanced", stack[0], support),
     )
+
+
+def _height(context: Context, box: str) -> float:
+    """Of a box with all that it carries (m)."""
+    above = (_height(context, other) for other in context.after.standing_on(box))
+    return 2 * context.half(box)[2] + max(above, default=0.0)
 
 
 def check(
@@ -65,8 +81,11 @@ def check(
     masses: Mapping[str, float],
     support: Mapping[str, str],
     top: Top,
+    placed: bool = True,
 ) -> float:
     """By how much (m) the centre of mass of a stack is outside of what carries it.
+
+    Where a plan puts it, it keeps an inset, and stays inside if all leans by what passes for level.
 
     Args:
         box: at the bottom of the stack.
@@ -74,10 +93,12 @@ def check(
         masses: of all of them, in any unit.
         support: what each stands on.
         top: of the box's support.
+        placed: whether a plan has put something there.
     """
-    x, y, _ = _centre_of_mass(box, boxes, masses, support)
+    x, y, z = _centre_of_mass(box, boxes, masses, support)
     offset, axes = (x - top.pose[0], y - top.pose[1], 0.0), axes_of(top.pose)
-    return max(abs(dot(offset, axes[axis])) - top.half[axis] + BALANCE_INSET for axis in (0, 1))
+    inset = max(BALANCE_INSET, LEVEL_ANGLE * (z - top.height)) if placed else 0.0
+    return max(abs(dot(offset, axes[axis])) - top.half[axis] + inset for axis in (0, 1))
 
 
 def whole_stack(box: str, support: Mapping[str, str]) -> list[str]:

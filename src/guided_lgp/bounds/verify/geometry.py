@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Collection, Mapping
+from functools import partial
 
 from guided_lgp.bounds.checks import Pose, Violation, box_sizes, top_of, turned_to_fingers, volumes
 from guided_lgp.bounds.results import Array
@@ -9,7 +10,6 @@ from guided_lgp.bounds.terms import balanced, hold, pads, stand
 from guided_lgp.robots import Arm, Robot
 from guided_lgp.scene import Scene
 from guided_lgp.scene.shapes import Convex
-from guided_lgp.scene.tolerances import BALANCE_INSET
 from guided_lgp.scene.world import Penetration, initial_poses
 
 HAND_DEPTH = 0.02
@@ -79,12 +79,10 @@ def placement_faults(
     for box in support if among is None else among:
         below = support[box]
         top = top_of(scene, boxes, below)
-        excess = {
-            "stand": stand.check(sizes[box], boxes[box], top),
-            "balanced": balanced.check(box, boxes, masses, support, top),
-        }
+        stack = partial(balanced.check, box, boxes, masses, support, top)
+        excess = {"stand": stand.check(sizes[box], boxes[box], top), "balanced": stack()}
         if excess["balanced"] > 0 and _untouched(scene, box, boxes, support):
-            excess["balanced"] -= BALANCE_INSET
+            excess["balanced"] = stack(placed=False)
         found += [Violation(f"{term} {box} {below}", e) for term, e in excess.items() if e > 0]
     return found
 
