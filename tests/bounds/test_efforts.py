@@ -80,12 +80,14 @@ def test_what_a_motor_cannot_hold_at_rest_is_named(start: Scene) -> None:
     still = Carried(Attachment("red", "left", 0, 2), grip)
     torques = joint_efforts(baxter, np.tile(q, (3, 1)), np.array([0.0, 0.1, 0.2]), [still])[0]
     excess = np.abs(torques) / robot.effort_limits - 1
-    found = overloads(baxter, q, [Load("left", "red", grip[:3])])
+    rows, loads = np.stack([robot.home, q]), [Load("left", "red", grip[:3])]
+    assert not overloads(baxter, rows[:1], loads)
+    found = overloads(baxter, rows, loads)
     assert [fault.constraint for fault in found] == ["effort left_s1", "effort right_s1"]
     left, right = (fault.amount for fault in found)
     assert left == pytest.approx(excess[1])
     assert left > right == pytest.approx(excess[8])
-    assert not overloads(start, PR2.home, [])
+    assert not overloads(start, PR2.home[None], [])
 
 
 def _fault(scene: Scene, trajectory: Trajectory) -> str:

@@ -376,11 +376,9 @@ class Task:
         action = self.manoeuvres[index]
         bodies = (action.body, *self.states[index].carried_by(action.body))
         loads = [Load(action.gripper, body, _AT_TOOL) for body in bodies]
-        for configuration in q:
-            whole = situation.q.copy()
-            whole[self.arms[action.gripper].arm.slice] = configuration
-            faults = overloads(self.scene, whole, loads)
-            if faults:
-                self.record(index, Stage.REACH, faults[0].constraint)
-                return True
-        return False
+        whole = np.tile(situation.q, (len(q), 1))
+        whole[:, self.arms[action.gripper].arm.slice] = q
+        faults = overloads(self.scene, whole, loads)
+        if faults:
+            self.record(index, Stage.REACH, faults[0].constraint)
+        return bool(faults)

@@ -86,22 +86,24 @@ class Load:
 
 
 def overloads(scene: Scene, q: Array, loads: Iterable[Load]) -> list[Violation]:
-    """Joints whose motor is too weak for the arms to rest at q (n,), in units of its limit.
+    """Joints whose motor is too weak for the arms to rest at the first of configurations (m, n)
+    where one is, in units of its limit.
 
     Springs that carry the arms leave their motors more than enough for what hands hold at rest.
     """
-    robot, rows = scene.robot.description, q[None]
+    robot = scene.robot.description
     if robot.balanced:
         return []
-    efforts = own_weights(scene, rows)
+    efforts = own_weights(scene, q)
     for load in loads:
         weight = BOX_DENSITY * volumes(scene)[load.box] * GRAVITY
-        forces = _in_base(scene, np.array([[0.0, 0.0, weight]]))
-        efforts += _lifting(scene, load.gripper, rows, load.centre, forces)
-    excess = np.abs(efforts[0]) / robot.effort_limits - 1.0
+        forces = _in_base(scene, np.tile([0.0, 0.0, weight], (len(q), 1)))
+        efforts += _lifting(scene, load.gripper, q, load.centre, forces)
+    excess = np.abs(efforts) / robot.effort_limits - 1.0
+    worst = excess[int(np.argmax((excess > 0).any(axis=1)))]
     return [
-        Violation(f"effort {robot.joint_names[joint]}", float(excess[joint]))
-        for joint in np.flatnonzero(excess > 0)
+        Violation(f"effort {robot.joint_names[joint]}", float(worst[joint]))
+        for joint in np.flatnonzero(worst > 0)
     ]
 
 

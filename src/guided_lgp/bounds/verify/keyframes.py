@@ -170,7 +170,7 @@ def _effort_faults(
         for box, gripper in held
         for name in whole_stack(box, support)
     )
-    return overloads(scene, reached.keyframe.q, loads)
+    return overloads(scene, reached.keyframe.q[None], loads)
 
 
 class _Reached:
