@@ -1,16 +1,14 @@
 """Bounds for users: which constraint of which action stopped the sequences of a search."""
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import partial
 
 from guided_lgp.bounds.coordination import Coordinator
 from guided_lgp.bounds.deadline import Deadline
 from guided_lgp.bounds.goals import GoalTerms
 from guided_lgp.bounds.results import CoarseResult, Failure, PathResult
 from guided_lgp.bounds.scene_bounds import SceneBounds
-from guided_lgp.leaving import caught
 from guided_lgp.logic import Action, Objective, Skeleton, State, format_skeleton, progress
 from guided_lgp.params import BoundsParams
 from guided_lgp.scene import Scene
@@ -82,11 +80,6 @@ def users_bounds(
     return SceneBounds(scene, params, deadline, objective, firm, shorten)
 
 
-def observed(bounds: SceneBounds) -> "ObservedBounds":
-    """The bounds of a scene as one search for a user's plan uses them."""
-    return ObservedBounds(bounds, bounds.placed, partial(caught, bounds.scene))
-
-
 class ObservedBounds:
     """The bounds of a scene as one search uses them; keeps what stopped its sequences.
 
@@ -94,21 +87,15 @@ class ObservedBounds:
     likely fail again, after seconds. A search that has found nothing without it, takes it up.
     """
 
-    def __init__(
-        self,
-        bounds: Bounds,
-        placed: frozenset[str] = frozenset(),
-        fault_of: Callable[[PathResult], Failure | None] = lambda result: None,
-    ) -> None:
+    def __init__(self, bounds: Bounds, placed: frozenset[str] = frozenset()) -> None:
         """Begin with nothing.
 
         Args:
             bounds: of the scene.
             placed: bodies whose last move goals ask more of than of others before it: where it
                 fails, the body may still be moved once more.
-            fault_of: why a motion will not do, though it has been verified.
         """
-        self._bounds, self._placed, self._fault_of = bounds, placed, fault_of
+        self._bounds, self._placed = bounds, placed
         self._coarse: dict[Skeleton, CoarseResult] = {}
         self._path: dict[Skeleton, PathResult] = {}
         self._stuck: dict[Skeleton, Failure] = {}
@@ -125,15 +112,11 @@ class ObservedBounds:
     def path(self, skeleton: Skeleton) -> PathResult:
         """See :class:`guided_lgp.search.bounds.Bounds`."""
         if skeleton not in self._path:
-            self._path[skeleton] = self._judged(self._bounds.path(skeleton))
+            self._path[skeleton] = self._bounds.path(skeleton)
         result = self._path[skeleton]
         if result.failure is not None and not self._ends(skeleton, result.failure.action):
             self._stuck[skeleton[: result.failure.action + 1]] = result.failure
         return result
-
-    def _judged(self, result: PathResult) -> PathResult:
-        fault = self._fault_of(result)
-        return PathResult(result.skeleton, feasible=False, failure=fault) if fault else result
 
     def _ends(self, skeleton: Skeleton, index: int) -> bool:
         """Whether an action is the last move of a body of which goals ask more then."""

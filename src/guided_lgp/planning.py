@@ -15,7 +15,7 @@ from guided_lgp.bounds.results import PathResult
 from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.domains import load_domain
 from guided_lgp.errors import InputError
-from guided_lgp.explanation import ObservedBounds, Obstacle, observed, users_bounds
+from guided_lgp.explanation import ObservedBounds, Obstacle, users_bounds
 from guided_lgp.hands import faster_by_other_hands
 from guided_lgp.logic import (
     Goal,
@@ -207,7 +207,7 @@ def plan(
         scene,
         goals,
         _limits(params.compare_scalability, scene, goals, prefix, max_nodes),
-        observed(scene_bounds),
+        ObservedBounds(scene_bounds, scene_bounds.placed),
         followed,
         parts=scene_bounds,
         misplaced=misplaced,
@@ -273,7 +273,7 @@ class _Attempts:
         self.last = replace(
             problem,
             scene=scene,
-            bounds=observed(bounds),
+            bounds=ObservedBounds(bounds, bounds.placed),
             parts=bounds,
             policy=problem.policy if knows else Uniform(),
         )
@@ -285,8 +285,8 @@ class _Attempts:
         self._starts += _observed(last).starts
         more = params.model_copy(update={"coarse_restarts": PATIENCE * params.coarse_restarts})
         bounds = self._bounds_of(last.scene, more)
-        judged = observed(bounds)
-        self.last = replace(last, bounds=judged, parts=bounds, widened=lambda: None)
+        observed = ObservedBounds(bounds, bounds.placed)
+        self.last = replace(last, bounds=observed, parts=bounds, widened=lambda: None)
         return self.last
 
     def take_up(self) -> bool:

@@ -32,6 +32,19 @@ def test_a_motion_is_read_as_it_is_declared() -> None:
     assert read.way_out.ways[0].of(np.eye(3)) == pytest.approx([0, 0, 0.1])
 
 
+def test_a_hand_that_lets_go_at_top_and_bottom_leaves_backwards() -> None:
+    paper = load_domain("pick_and_place")
+    place = manoeuvre(paper.bind(Action("place", ("pr2L", "red", "table"))))
+    quarter = np.array(
+        [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]
+    )  # fingers close upright
+    (back,) = place.ways_out(quarter)
+    assert back.of(quarter) == pytest.approx([-0.09, 0, 0])
+    assert len(place.ways_out(np.eye(3))) == 3
+    grasp = manoeuvre(paper.bind(Action("grasp", ("pr2L", "red"))))
+    assert grasp.ways_out(quarter) == grasp.way_out.ways
+
+
 def test_other_ways_follow_the_declared_one() -> None:
     motion = (*MOTION[:2], line_in(g, down=0.05, otherwise="back"), *MOTION[3:])
     ways = manoeuvre(domain(*motion).bind(Action("snatch", ("pr2L", "red")))).way_in.ways

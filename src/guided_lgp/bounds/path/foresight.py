@@ -181,13 +181,15 @@ class Foresight:
     ) -> bool:
         """Whether the hand, where it is the one that leaves, has a free end of its way out."""
         task, (number, value, branch) = self._task, choice
-        way_out = task.manoeuvres[later].way_out
-        if way_out.gripper != holder:
+        action = task.manoeuvres[later]
+        if action.way_out.gripper != holder:
             return True
         rotation, contact = solutions.rotation[number], solutions.contact[number]
-        ends = np.array([contact + way.of(rotation) for way in way_out.ways])[:, None]
+        ends = [contact + way.of(rotation) for way in action.ways_out(rotation)]
         q, valid = task.arms[holder].inverse(
-            rotation, ends, solutions.redundancies[value] + np.array(task.shifts(holder))
+            rotation,
+            np.reshape(ends, (-1, 1, 3)),
+            solutions.redundancies[value] + np.array(task.shifts(holder)),
         )
         if not valid[..., branch].any():
             task.record(later, Stage.OFF, "out of reach on the way out")

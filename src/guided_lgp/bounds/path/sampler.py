@@ -227,7 +227,8 @@ class OutcomeSampler:
         task, action = self._task, self._task.manoeuvres[index]
         around = switched.around(action.way_out.gripper, [(action.body, self._parent(index))])
         at_end = switched.around(action.way_out.gripper)
-        for way, shift in product(action.way_out.ways, task.shifts(action.way_out.gripper)):
+        ways = action.ways_out(tool.rotation)
+        for way, shift in product(ways, task.shifts(action.way_out.gripper)):
             out = self._line(index, Stage.LINE_OUT, around, tool, way.of(tool.rotation), shift)
             if out is not None and not task.blocked(
                 index, Stage.OUT, "after the contact", at_end, out[-1:]

@@ -14,6 +14,7 @@ direction and length (m): ``back`` against the approach of the hand, ``up`` or `
 vertical; ``otherwise`` names a direction for further ways.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,6 +35,8 @@ _OPTIONS = {"present": ("by",), "line_in": _LINE, "switch": ("close", "open"), "
 """Which options steps have."""
 _PAST = 0.11
 """Length (m) of the way up on which an open hand leaves what it held, however deep."""
+_FLAT = math.cos(math.pi / 4)
+"""Of the angle between the fingers' closing direction and the vertical."""
 UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -94,6 +97,16 @@ class Manoeuvre:
     def gripper(self) -> str:
         """Whose arm makes the contact."""
         return self.way_in.gripper
+
+    def ways_out(self, rotation: Array) -> tuple[Way, ...]:
+        """The ways out for a rotation (3, 3) of the tool frame.
+
+        A hand that lets go at top and bottom has a finger below the body: it leaves backwards.
+        """
+        ways = self.way_out.ways
+        if self.opening == self.way_out.gripper and abs(rotation[2, 1]) > _FLAT:
+            return tuple(way for way in ways if way.up == 0.0)
+        return ways
 
 
 def manoeuvre(declared: GroundInstruction, file: str = "") -> Manoeuvre:
