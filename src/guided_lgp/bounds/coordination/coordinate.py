@@ -21,6 +21,8 @@ from guided_lgp.logic import Skeleton
 from guided_lgp.scene import Scene
 from guided_lgp.scene.world import world_of
 
+_ITERATIONS = 150
+"""Samples of the sampling planner per motion, as of the path bound."""
 _ATTEMPTS = 3
 """Schedules that are verified, each without the faults of those before."""
 
@@ -51,7 +53,7 @@ class Coordinator:
     @cached_property
     def _mover(self) -> Mover:
         """Made when first needed: most searches end without a path."""
-        return Mover(self._scene, 0, self._deadline)
+        return Mover(self._scene, _ITERATIONS, self._deadline)
 
     def shorten(self, result: PathResult) -> PathResult:
         """The same actions in less time; actions of two arms may change places.

@@ -180,9 +180,12 @@ class Road:
         slower = self._stops[end.stop].slower
         for _ in range(_PATIENCE):
             q = self._timed(way, slower)
-            free, away = self._between(way, q), self._between(way, q, _NEAR)
-            if away[1] - away[0] >= len(fingers[1]) - 1:
-                yield self._edge(node, end, *self._together(q, free, away[1], *fingers), needs)
+            away = self._between(way, q, _NEAR)
+            lacking = max(len(fingers[1]) - 1 - (away[1] - away[0]), 0)
+            if not lacking or not self.contacts(node):
+                q = np.pad(q, ((lacking, 0), (0, 0)), mode="edge")
+                free, near = self._between(way, q), away[1] + lacking
+                yield self._edge(node, end, *self._together(q, free, near, *fingers), needs)
                 return
             slower *= _SLOWER
 

@@ -1,6 +1,6 @@
 """The paths of one arm from one stop to the next: straight on, or by its side."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -14,6 +14,10 @@ from guided_lgp.robots import PlacedArm
 
 _GUESS = 12
 """Configurations of a straight line in joint space from which a path is optimised."""
+_SAMPLED = 3
+"""Paths by samples from which one is optimised where nothing else leads to one."""
+_INSET = 1e-4
+"""Distance (rad) from the joint limits of a path: many a contact is as near."""
 _LEG = 2
 """Steps (of about a centimetre) that a hand goes straight at least, off a contact or to one."""
 
@@ -148,25 +152,38 @@ class Gap:
         self, transit: Transit, out: Array, paths: Sequence[Array], into: Array
     ) -> list[Array]:
         """The same with free paths that may be one."""
-        path = optimal_path(self._mover, transit, np.concatenate(paths), *_lines(out, into))
+        guess, beside = np.concatenate(paths), _lines(out, into)
+        path = optimal_path(self._mover, transit, guess, *beside, inset=_INSET)
         if path is None:
             return self._split(transit, out, paths, into)
         return [np.concatenate([out, path[1:], into[1:]])]
 
     def _free(self, transit: Transit, lines: tuple[Array, Array], detour: Array) -> Array | None:
-        """The best free path (m, n) between two straight ways, begun from the line between them or
-        from a detour.
+        """The best free path (m, n) between two straight ways, begun from the line between them,
+        from a detour, or else from a path by samples.
         """
-        line = np.linspace(detour[0], detour[-1], _GUESS)
-        guesses = [detour] if transit.keep_level else [line, detour]
         beside = _lines(*lines)
-        paths = (optimal_path(self._mover, transit, guess, *beside) for guess in guesses)
+        guesses = self._guesses(transit, detour)
+        paths = (
+            optimal_path(self._mover, transit, guess, *beside, inset=_INSET) for guess in guesses
+        )
         return next((path for path in paths if path is not None), None)
 
+    def _guesses(self, transit: Transit, detour: Array) -> Iterator[Array]:
+        if not transit.keep_level:
+            yield np.linspace(detour[0], detour[-1], _GUESS)
+        yield detour
+        plan = self._mover.level_transit if transit.keep_level else self._mover.transit
+        for seed in range(_SAMPLED):
+            rng = np.random.default_rng(seed)
+            found = plan(transit.surroundings, detour[0], detour[-1], rng)
+            if found is not None:
+                yield np.concatenate([found[0], *(path[1:] for path in found[1:])])
 
-def _lines(*ways: Array) -> list[Array | None]:
-    """Those of some straight ways that are no single configuration."""
-    return [way if len(way) > 1 else None for way in ways]
+
+def _lines(before: Array, after: Array) -> tuple[Array | None, Array | None]:
+    """Two straight ways; None in place of a single configuration."""
+    return before if len(before) > 1 else None, after if len(after) > 1 else None
 
 
 def _straight(way: Array) -> int:

@@ -106,7 +106,12 @@ def _freedom(motion: Motion) -> bool | None:
 
 
 def optimal_path(
-    mover: Mover, transit: Transit, path: Array, before: Array | None, after: Array | None
+    mover: Mover,
+    transit: Transit,
+    path: Array,
+    before: Array | None,
+    after: Array | None,
+    inset: float = _NEAR_LIMIT,
 ) -> Array | None:
     """The best free spline (m, n) found between the ends of a path, or None.
 
@@ -119,6 +124,7 @@ def optimal_path(
         path: (m, n) from which to start.
         before: the straight line that leads to its first configuration, if there is one.
         after: the one that begins at its last.
+        inset: distance (rad) from the joint limits that the spline keeps.
     """
     placed = mover.arms[transit.surroundings.scene.gripper]
     arm = placed.arm
@@ -146,9 +152,7 @@ def optimal_path(
         moved = np.concatenate([last[:1], found, last[-1:]])
         candidate = spline.sampled(moved)
         clear = (
-            np.all(
-                (candidate > limits[:, 0] + _NEAR_LIMIT) & (candidate < limits[:, 1] - _NEAR_LIMIT)
-            )
+            np.all((candidate > limits[:, 0] + inset) & (candidate < limits[:, 1] - inset))
             and (vertical is None or _turned(placed, candidate, vertical) < LEVEL)
             and mover.collision(transit.surroundings, candidate) is None
         )
