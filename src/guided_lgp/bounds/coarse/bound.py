@@ -2,9 +2,9 @@
 
 import time
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 
@@ -176,33 +176,34 @@ class CoarseBound:
         """
         self._deadline.check()
         kept = prefix if number == 0 or number % 2 else None
-        generator = _generator(programs.skeleton, number)
+        random = _random(programs.skeleton, number)
         variant = Variant() if kept is None else kept.variant
-        variant = programs.variants.tried(number, generator, variant)
+        variant = programs.variants.tried(number, random, variant)
         formulation = programs.built(number, variant)
         start = self._starts.draw(
             formulation,
-            generator,
+            random,
             noise=0.0 if number == 0 else _NOISE,
             warm_start=None if kept is None else kept.values,
         )
-        check = partial(self._check, programs, formulation, restarts=number + 1)
+        check = partial(self._check, programs, formulation, variant, restarts=number + 1)
         if kept is not None and kept.values is not None and number == 0:
             still = formulation.program.holding(kept.values)
             solution = self._solver.solve(still, start, _BRIEF)
             if solution.converged(_BRIEF):
                 result = check(solution, prefix=kept)
                 if result.feasible:
-                    return replace(result, variant=variant)
+                    return result
         solution = self._solver.solve(formulation.program, start, self._settings)
         if kept is not None and not _begins_with(solution.values, kept.values):
             kept = None
-        return replace(check(solution, prefix=kept), variant=variant)
+        return check(solution, prefix=kept)
 
     def _check(
         self,
         programs: Programs,
         formulation: Formulation,
+        variant: Variant,
         solution: Solution,
         *,
         restarts: int,
@@ -229,6 +230,7 @@ class CoarseBound:
             after_action=after_action,
             restarts=restarts,
             values=solution.values[: formulation.program.variables],
+            variant=variant,
         )
 
     def _keyframes(
@@ -259,6 +261,14 @@ def _begins_with(values: Array, prefix: Array | None) -> bool:
     return prefix is not None and np.array_equal(values[: len(prefix)], prefix)
 
 
-def _generator(skeleton: Skeleton, number: int) -> np.random.Generator:
-    """Random numbers of one start: of the skeleton and the number of the start only."""
-    return np.random.default_rng([zlib.crc32(format_skeleton(skeleton).encode()), number])
+def _random(skeleton: Skeleton, number: int) -> Callable[[], np.random.Generator]:
+    """Random numbers of one start: of the skeleton and the number of the start only.
+
+    Many starts need none, so that the generator is made when it is asked for.
+    """
+
+    @cache
+    def generator() -> np.random.Generator:
+        return np.random.default_rng([zlib.crc32(format_skeleton(skeleton).encode()), number])
+
+    return generator

@@ -7,8 +7,7 @@ every stack is balanced. An arm stands at its side, except while the box that it
 others.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
-from copy import copy
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,7 +22,7 @@ from guided_lgp.bounds.program.slots import ArmConfiguration, HeldBox, KeyframeS
 from guided_lgp.bounds.results import Array
 from guided_lgp.bounds.terms import find_term
 from guided_lgp.bounds.terms.apart import keep_apart
-from guided_lgp.bounds.terms.clear import keep_clear
+from guided_lgp.bounds.terms.clear import surroundings
 from guided_lgp.bounds.terms.hold import take_over
 from guided_lgp.bounds.terms.term import GoalTerm
 from guided_lgp.logic import Action, GroundInstruction, GroundTerm, Skeleton, successor
@@ -121,7 +120,8 @@ class Formulator:
         )
 
     def _copy(self) -> "Formulator":
-        other = copy(self)
+        other = Formulator.__new__(Formulator)
+        vars(other).update(vars(self))
         other._context = self._context.copy()
         return other
 
@@ -180,19 +180,24 @@ class Formulator:
         """Keep an arm clear of tables, level boxes and the other arms."""
         context, gripper = self._context, configuration.held.gripper
         ends = (segment.joints for segment in configuration.segments)
+        about = surroundings(context, gripper, self._others(configuration.held.box))
         for joints in (configuration.joints, *ends):
-            for name in context.geometry.bodies:
-                if name != configuration.held.box and not context.at_side(name):
-                    keep_clear(context, gripper, joints, name)
+            context.program.repeat(about, joints)
             for other in context.others(gripper):
                 if joints is configuration.joints or other in context.standing:
                     keep_apart(context, gripper, joints, other, context.joints(other))
+
+    def _others(self, box: str) -> Iterator[str]:
+        """All bodies but a box that are not at an arm's side."""
+        context = self._context
+        return (n for n in context.geometry.bodies if n != box and not context.at_side(n))
 
     def _keep_standing_arms_clear(self, actor: str, body: str) -> None:
         """Of what has been put down."""
         for gripper, standing in self._context.standing.items():
             if gripper != actor:
-                keep_clear(self._context, gripper, standing.joints, body)
+                about = surroundings(self._context, gripper, (body,))
+                self._context.program.repeat(about, standing.joints)
 
 
 def straight_lines(motion: Iterable[GroundTerm], low: bool = False) -> tuple[Line, ...]:

@@ -41,9 +41,11 @@ static void gather(const program *nlp, int i, const double *values, double *x)
 }
 
 /* Rows that were evaluated last, where, and how far each instance was from having any effect then:
- * inequalities that are not active, nor have a multiplier, count for nothing. */
+ * inequalities that are not active, nor have a multiplier, count for nothing. What cannot move is
+ * still: it has been evaluated once for all. */
 typedef struct {
     double *rows, *inputs, *spare;
+    char *still;
 } memory;
 
 static void find_spare(const program *nlp, const double *multiplier, double penalty, int i,
@@ -77,6 +79,8 @@ static void residuals(const program *nlp, const double *values, const double *mu
 {
     double x[LARGEST_INPUT], work[WORK];
     for (int i = 0; i < nlp->instances; i++) {
+        if (last->still[i])
+            continue;
         gather(nlp, i, values, x);
         if (is_idle(nlp, i, x, last))
             continue;
@@ -137,14 +141,14 @@ static int is_active(const program *nlp, int i, const double *c, const double *m
     return 0;
 }
 
-/* Whether any input of an instance is a variable that can move. */
-static int is_free(const program *nlp, int i)
+/* Whether no input of an instance is a variable that can move. */
+static int is_still(const program *nlp, int i)
 {
     const int *inputs = nlp->inputs + nlp->input_start[i];
     for (int j = 0; j < kernel_table[nlp->kernel[i]].inputs; j++)
         if (inputs[j] < nlp->variables && nlp->lower[inputs[j]] < nlp->upper[inputs[j]])
-            return 1;
-    return 0;
+            return 0;
+    return 1;
 }
 
 /* The shape of H where some instances are active. */
@@ -171,14 +175,14 @@ static void find_shape(const program *nlp, const char *active, skyline *shape)
 
 /* Gradient g and Gauss-Newton matrix H. */
 static void linearise(const program *nlp, const double *values, const double *c,
-                      const double *multiplier, double penalty, char *active, skyline *shape,
-                      double *g, double *H)
+                      const double *multiplier, double penalty, const char *still, char *active,
+                      skyline *shape, double *g, double *H)
 {
     int n = nlp->variables;
     double x[LARGEST_INPUT], work[WORK], again[LARGEST_ROWS];
     double jacobian[LARGEST_ROWS * LARGEST_INPUT];
     for (int i = 0; i < nlp->instances; i++)
-        active[i] = is_free(nlp, i) && is_active(nlp, i, c, multiplier, penalty);
+        active[i] = !still[i] && is_active(nlp, i, c, multiplier, penalty);
     find_shape(nlp, active, shape);
     memset(H, 0, sizeof(double) * (shape->end[n - 1] + 1));
     for (int v = 0; v < n; v++) {
@@ -229,8 +233,9 @@ int coarse_solve(const program *nlp, const settings *options, double *values, do
     int n = nlp->variables, rows = nlp->rows, tried = 0;
     int *places = malloc(sizeof(int) * 4 * n);
     skyline shape = {places, places + n};
-    char *active = malloc(nlp->instances);
+    char *active = malloc(2 * nlp->instances), *still = active + nlp->instances;
     memset(active, 1, nlp->instances);
+    memset(still, 0, nlp->instances);
     find_shape(nlp, active, &shape); /* the largest */
     size_t entries = shape.end[n - 1] + 1;
     int last_input = nlp->instances - 1, inputs = 0;
@@ -241,20 +246,23 @@ int coarse_solve(const program *nlp, const settings *options, double *values, do
     char *held = malloc(n);
     double *H = doubles, *L = H + entries, *g = L + entries, *d = g + n, *old = d + n;
     double *multiplier = old + n, *c_new = multiplier + rows, *panel = c_new + rows;
-    memory last = {panel + PANEL * n, panel + PANEL * n + rows, panel + PANEL * n + rows + inputs};
+    memory last = {panel + PANEL * n, panel + PANEL * n + rows, panel + PANEL * n + rows + inputs,
+                   still};
     double penalty = options->penalty, damping = options->damping;
 
     memset(multiplier, 0, sizeof(double) * rows);
     for (int i = 0; i < nlp->instances; i++)
         last.spare[i] = -1;
     residuals(nlp, values, multiplier, penalty, &last, c);
+    for (int i = 0; i < nlp->instances; i++)
+        still[i] = is_still(nlp, i);
     double worst = violation(nlp, c, options->slack), best = worst;
     int improved = 0; /* step of the last good gain on the violation */
     while (worst > options->tolerance && tried < options->steps &&
            tried - improved < options->patience) {
         double value = merit(nlp, values, c, multiplier, penalty);
         for (int inner = 0; inner < options->inner && tried < options->steps; inner++) {
-            linearise(nlp, values, c, multiplier, penalty, active, &shape, g, H);
+            linearise(nlp, values, c, multiplier, penalty, still, active, &shape, g, H);
             for (int v = 0; v < n; v++) {
                 int k = nlp->order[v];
                 held[k] = nlp->lower[v] == nlp->upper[v] ||

@@ -5,6 +5,8 @@ gripper, one pitch for which all its configurations have an inverse kinematic so
 joint limits. That is most of the work: the solver only has to make it collision-free and exact.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
 from guided_lgp.bounds.coarse.formulation import Formulation
@@ -28,7 +30,7 @@ class Starts:
     def draw(
         self,
         formulation: Formulation,
-        generator: np.random.Generator,
+        random: Callable[[], np.random.Generator],
         noise: float,
         warm_start: Array | None = None,
     ) -> Array:
@@ -36,7 +38,7 @@ class Starts:
 
         Args:
             formulation: the program.
-            generator: for placements and choices.
+            random: the generator for placements and choices, always the same one.
             noise: how far from the best candidates the choice may be (0: the best ones).
             warm_start: values of the first variables, which are kept.
 
@@ -53,7 +55,7 @@ class Starts:
             program.variables,
             program.lower,
             kept,
-            generator,
+            random,
             noise,
             formulation.configurations,
             self._robot,

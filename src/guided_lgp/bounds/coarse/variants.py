@@ -4,7 +4,7 @@ A grip closes on one of the pairs of sides that the hand can take, or is one of 
 Below something, a box comes and goes by a low straight way as well as from above.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,16 +52,18 @@ class Variants:
         turns = int(np.lcm.reduce([1, *self._sides])) * max(self._low, default=1)
         return max(least, min(2 * turns, _MOST_STARTS))
 
-    def tried(self, number: int, generator: np.random.Generator, kept: Variant) -> Variant:
+    def tried(
+        self, number: int, random: Callable[[], np.random.Generator], kept: Variant
+    ) -> Variant:
         """What a start chooses.
 
         Args:
             number: of the start.
-            generator: for every other start, which keeps nothing and draws.
+            random: the generator of every other start, which keeps nothing and draws.
             kept: of the prefix; the last action tries one choice after the other.
         """
         if number and number % 2 == 0:
-            return Variant(_drawn(generator, self._sides), _drawn(generator, self._low))
+            return Variant(_drawn(random(), self._sides), _drawn(random(), self._low))
         turn, new = (number + 1) // 2, self._sides[len(kept.sides) :]
         sides = tuple(turn % count for count in new)
         turn //= max(new, default=1)

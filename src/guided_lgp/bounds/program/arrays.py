@@ -2,7 +2,6 @@
 
 from array import array
 from collections.abc import Sequence
-from copy import copy
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -79,6 +78,19 @@ class Instance(NamedTuple):
         return " ".join((self.names[0], self.links[row], *self.names[2:]))
 
 
+@dataclass(frozen=True)
+class Instances:
+    """Kernel instances that several configurations of an arm add alike, but for its joints."""
+
+    meanings: list[Instance]
+    kernel: "array[int]"
+    inputs: list[tuple[int, ...]]
+    """The slots of each, after those of the joints."""
+    parameters: "array[float]"
+    levers: "array[float]"
+    """Of all inputs."""
+
+
 class ProgramBuilder:
     """Collects variables, constants and kernel instances."""
 
@@ -98,10 +110,9 @@ class ProgramBuilder:
 
     def copy(self) -> "ProgramBuilder":
         """Another that goes on from here."""
-        other = copy(self)
-        for name, collected in vars(self).items():
-            if isinstance(collected, array | list):
-                setattr(other, name, collected[:])
+        other = ProgramBuilder.__new__(ProgramBuilder)
+        for name, value in vars(self).items():
+            setattr(other, name, value[:] if isinstance(value, array | list) else value)
         return other
 
     def constant(self, value: float) -> int:
@@ -140,12 +151,25 @@ class ProgramBuilder:
         levers: Sequence[float] | None = None,
     ) -> None:
         """Add an instance of a kernel; see :class:`Instance` and :class:`Program`."""
-        number = self._table.number[kernel]
+        number = self.number(kernel)
         self._kernel.append(number)
         self._inputs.extend(inputs)
         self._parameters.extend(parameters)
         self._levers.extend([np.inf] * len(inputs) if levers is None else levers)
         self.instances.append(Instance(action, number, names, links))
+
+    def number(self, kernel: str) -> int:
+        """Of a kernel in the table."""
+        return self._table.number[kernel]
+
+    def repeat(self, instances: Instances, joints: tuple[int, ...]) -> None:
+        """Add instances for one configuration of the arm, the slots of its joints."""
+        self._kernel.extend(instances.kernel)
+        for others in instances.inputs:
+            self._inputs.extend(joints + others)
+        self._parameters.extend(instances.parameters)
+        self._levers.extend(instances.levers)
+        self.instances.extend(instances.meanings)
 
     def build(self) -> Program:
         """The program."""

@@ -1,7 +1,6 @@
 """What is where at a point of a skeleton, in slots of a program: the mode tree with geometry."""
 
 from collections.abc import Callable, Sequence
-from copy import copy
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -116,7 +115,8 @@ class Context:
 
     def copy(self) -> "Context":
         """Another that goes on from here, after the same actions."""
-        other = copy(self)
+        other = Context.__new__(Context)
+        vars(other).update(vars(self))
         other.program = self.program.copy()
         for name in _GROWING:
             setattr(other, name, getattr(self, name).copy())

@@ -1,6 +1,6 @@
 """A start in the making: values that are kept from before, and values that terms choose."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -19,7 +19,7 @@ class Draft:
         variables: int,
         lower: Array,
         kept: int,
-        generator: np.random.Generator,
+        random: Callable[[], np.random.Generator],
         noise: float,
         configurations: Mapping[HeldBox, Sequence[ArmConfiguration]],
         robot: RobotKinematics,
@@ -32,7 +32,7 @@ class Draft:
             variables: their number.
             lower: bounds of the variables.
             kept: how many values, the first ones, are known and stay.
-            generator: for placements and choices.
+            random: the generator for placements and choices, always the same one.
             noise: how far from the best candidates a choice may be (0: the best ones).
             configurations: of each grip.
             robot: whose arms these are.
@@ -41,12 +41,17 @@ class Draft:
         self.values = values
         self.lower = lower
         self.kept = kept
-        self.generator = generator
+        self._random = random
         self.noise = noise
         self.configurations = configurations
         self.robot = robot
         self.ik = ik
         self._variables = variables
+
+    @property
+    def generator(self) -> np.random.Generator:
+        """For placements and choices."""
+        return self._random()
 
     def pose(self, pose: PlanarPose) -> Array:
         """x, y, yaw and z of a level body."""

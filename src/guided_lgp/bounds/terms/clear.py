@@ -1,9 +1,12 @@
 """``clear(gripper, body)``: the spheres of an arm keep their distance from a level box or table."""
 
+from array import array
+from collections.abc import Iterable
 from math import hypot
 
 import casadi as ca
 
+from guided_lgp.bounds.program.arrays import Instance, Instances
 from guided_lgp.bounds.program.context import Context
 from guided_lgp.bounds.program.kernels import SCALE, Kernel, distance, in_frame, kernel
 from guided_lgp.bounds.program.kinematics import Chain, RobotKinematics, levers
@@ -31,32 +34,28 @@ def _kernels(robot: RobotKinematics) -> tuple[Kernel, ...]:
     return tuple(_kernel(chain, len(robot.fixed)) for chain in robot.chains)
 
 
-def keep_clear(context: Context, gripper: str, joints: tuple[int, ...], body: str) -> None:
-    """Of one configuration of an arm."""
-    arm, pose = context.robot.arms[gripper], context.pose[body]
-    half, closed = context.half(body), context.closed(gripper)
-    turns = SCALE * hypot(*half[:2])
-    context.rows(
-        f"clear_{arm.chain.name}",
-        (*joints, *pose.plane, pose.z),
-        (
-            *context.arm_parameters(arm),
-            closed,
-            pose.offset,
-            *half,
-            context.margins.clear,
-        ),
-        ("clear", gripper, body),
-        arm.links,
-        (*levers(arm.chain, closed), SCALE, SCALE, turns, SCALE),
-    )
+def surroundings(context: Context, gripper: str, bodies: Iterable[str]) -> Instances:
+    """The rows of an arm, wherever it is, that keep it clear of some bodies."""
+    arm, closed = context.robot.arms[gripper], context.closed(gripper)
+    number = context.program.number(f"clear_{arm.chain.name}")
+    own, reach = (*context.arm_parameters(arm), closed), levers(arm.chain, closed)
+    found = Instances([], array("i"), [], array("d"), array("d"))
+    for body in bodies:
+        pose, (x, y, z) = context.pose[body], context.half(body)
+        names = ("clear", gripper, body)
+        found.meanings.append(Instance(context.action, number, names, arm.links))
+        found.kernel.append(number)
+        found.inputs.append((pose.x, pose.y, pose.yaw, pose.z))
+        found.parameters.extend((*own, pose.offset, x, y, z, context.margins.clear))
+        found.levers.extend((*reach, SCALE, SCALE, SCALE * hypot(x, y), SCALE))
+    return found
 
 
 def _add(context: Context, gripper: str, body: str) -> None:
     """Where the arm stands, or is at the switch."""
     posed = (context.standing | context.acting).get(gripper)
     joints = context.home[gripper] if posed is None else posed.joints
-    keep_clear(context, gripper, joints, body)
+    context.program.repeat(surroundings(context, gripper, (body,)), joints)
 
 
 TERM = Term(_add, _kernels)

@@ -53,20 +53,23 @@ def verify_keyframe(
         What is violated; nothing if the keyframe is good.
     """
     (reached,) = _reached(world.scene, [keyframe])
-    return _faults(world, reached, state, action)
+    after = state if action is None else successor(state, action)
+    return _faults(world, reached, state, after)
 
 
 def _faults(
     world: World,
     reached: "_Reached",
     state: State,
-    action: Action | None,
+    after: State,
     good: Mapping[str, Stack] = NOTHING,
 ) -> list[Violation]:
-    """What is violated in a keyframe; some stacks have been found good before."""
+    """What is violated in a keyframe, at a switch from one state to another, or else in one state.
+
+    Some stacks have been found good before.
+    """
     if not reached.is_finite:
         return [Violation("finite pose", math.nan)]
-    after = state if action is None else successor(state, action)
     held = tuple(dict.fromkeys((*state.held, *after.held)))
     support = dict(state.support) | dict(after.support)
     convex, robot = box_bodies(world.scene), world.scene.robot.description
@@ -120,9 +123,9 @@ def verify_keyframes(
     frames = iter(_reached(world.scene, [frame for pair in pairs for frame in pair]))
     for index, action in enumerate(skeleton[verified:], verified):
         after = successor(state, action)
-        for modes, contact in ((state, action), (after, None)):
+        for modes in (state, after):
             reached = next(frames)
-            found = _faults(world, reached, modes, contact, last.stacks)
+            found = _faults(world, reached, modes, after, last.stacks)
             found = found or _slips(last, reached, modes)
             if found:
                 return Violation(found[0].constraint, found[0].amount, index)
@@ -147,15 +150,20 @@ def _finger_value(fingers: Fingers, width: float, closed: bool) -> float:
 
 def joint_limit_faults(robot: Robot, q: Array) -> list[Violation]:
     """Joints of a configuration (n,) outside their limits."""
-    limits = robot.position_limits
-    excess = np.maximum(limits[:, 0] - q, q - limits[:, 1])
-    if not excess.max() <= LIMIT_TOLERANCE:  # also if not a number
-        return [
-            Violation(f"joint limit {robot.joint_names[index]}", float(excess[index]))
-            for index in range(len(excess))
-            if not excess[index] <= LIMIT_TOLERANCE
-        ]
-    return []
+    bounds = zip(_limits(robot), q.tolist(), strict=True)
+    excess = [max(low - value, value - high) for (low, high), value in bounds]
+    return [
+        Violation(f"joint limit {robot.joint_names[index]}", beyond)
+        for index, beyond in enumerate(excess)
+        if not beyond <= LIMIT_TOLERANCE  # also if not a number
+    ]
+
+
+@lru_cache(maxsize=8)
+def _limits(robot: Robot) -> list[list[float]]:
+    """In plain numbers, which is many times faster for one configuration."""
+    limits: list[list[float]] = robot.position_limits.tolist()
+    return limits
 
 
 def _effort_faults(
