@@ -8,7 +8,7 @@ is certified as free needs none.
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
-from itertools import product
+from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
@@ -223,7 +223,10 @@ class CollisionChecker:
         else:
             near = self._certificate.near(moving, self._apart, PADDING)
             unsure = np.flatnonzero(near.any(axis=1))
-            pairs = map(self._first_of, self._coordinates(moving[unsure]), near[unsure])
+            ends = np.cumsum(np.count_nonzero(near[unsure], axis=1)).tolist()
+            numbers = [self._active[place] for place in near[unsure].nonzero()[1].tolist()]
+            those = (numbers[begin:end] for begin, end in pairwise((0, *ends)))
+            pairs = map(self._first_of, self._coordinates(moving[unsure]), those)
         yield from ((row, pair) for row, pair in zip(unsure.tolist(), pairs, strict=True) if pair)
 
     def _first_of_all(self, coordinates: Array) -> tuple[str, str] | None:
@@ -238,14 +241,14 @@ class CollisionChecker:
             return None
         return self._named(self._callback.collisionPairIndex)
 
-    def _first_of(self, coordinates: Array, near: NDArray[np.bool_]) -> tuple[str, str] | None:
-        """The same, of those pairs (p,) alone that may be near each other."""
+    def _first_of(self, coordinates: Array, those: list[int]) -> tuple[str, str] | None:
+        """The same, of those pairs alone that may be near each other."""
         pin.updateGeometryPlacements(
             self._model, self._data, self._geometry, self._geometry_data, coordinates
         )
-        for place in np.flatnonzero(near).tolist():
-            if pin.computeCollision(self._geometry, self._geometry_data, self._active[place]):
-                return self._named(self._active[place])
+        for pair in those:
+            if pin.computeCollision(self._geometry, self._geometry_data, pair):
+                return self._named(pair)
         return None
 
     def _named(self, pair: int) -> tuple[str, str]:

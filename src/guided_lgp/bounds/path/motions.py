@@ -1,6 +1,6 @@
 """Motions of one arm while everything else stands still: transits and straight lines."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -140,32 +140,42 @@ class Mover:
         """
         return self._space(surroundings).distances(q, count)
 
-    def line(
-        self,
-        surroundings: Surroundings,
-        tool: Tool,
-        direction: Array,
-        shift: float = 0.0,
-    ) -> Array | Pair | None:
-        """A free straight line of the tool, which does not turn.
+    def line(self, surroundings: Surroundings, tool: Tool, direction: Array) -> Array | Pair | None:
+        """A free straight line on which the redundant joint stays; see :meth:`lines`."""
+        return next(self.lines(surroundings, tool, direction, (0.0,)))
+
+    def lines(
+        self, surroundings: Surroundings, tool: Tool, direction: Array, shifts: Sequence[float]
+    ) -> Iterator[Array | Pair | None]:
+        """Free straight lines of the tool, which does not turn.
+
+        As a rule the first one is, and nobody asks for the others: these are solved at once.
 
         Args:
             surroundings: what stands still.
             tool: at the start.
             direction: displacement (3,) of the tool (m).
-            shift: turn of the redundant joint (rad) on the way.
+            shifts: turns of the redundant joint (rad) on the way, for a line each.
 
-        Returns:
+        Yields:
             Configurations (m, n); or two bodies in collision; or None, it is out of reach.
         """
         arm = self.arms[surroundings.scene.gripper]
         count = 2 + int(np.linalg.norm(direction) / LINE_STEP)
         position = tool.position + np.linspace(0.0, 1.0, count)[:, None] * direction
-        redundancy = np.linspace(tool.redundancy, tool.redundancy + shift, count)
-        q, valid = arm.inverse(tool.rotation, position, redundancy)
-        path = arm.follow(q, valid, tool.branch)
-        if path is None:
-            return None
+        for together in filter(len, (shifts[:1], shifts[1:])):
+            ends = tool.redundancy + np.array(together)
+            redundancies = np.linspace(tool.redundancy, ends, count, axis=1)
+            solved = arm.inverse(tool.rotation, position, redundancies)
+            for q, valid in zip(*solved, strict=True):
+                path = arm.follow(q, valid, tool.branch)
+                yield None if path is None else self._checked(surroundings, tool, position, path)
+
+    def _checked(
+        self, surroundings: Surroundings, tool: Tool, position: Array, path: Array
+    ) -> Array | Pair | None:
+        """A path (m, n) of an arm if its tool follows positions (m, 3), else as :meth:`lines`."""
+        arm = self.arms[surroundings.scene.gripper]
         rotation, middle = arm.forward((path[:-1] + path[1:]) / 2)
         astray = np.abs(middle - (position[:-1] + position[1:]) / 2).max()
         turned_by = np.abs(rotation - tool.rotation).max()

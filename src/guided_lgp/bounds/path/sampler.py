@@ -6,13 +6,13 @@ contact and the ends of the straight ways are free, then the ways, then the tran
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import islice, product
+from itertools import islice
 from typing import Literal
 
 import numpy as np
 
 from guided_lgp.bounds.path.contacts import Contacts, ContactSampler
-from guided_lgp.bounds.path.motions import Motion, Surroundings, Tool
+from guided_lgp.bounds.path.motions import Motion, Pair, Tool
 from guided_lgp.bounds.path.postures import Postures
 from guided_lgp.bounds.path.situation import Attach, Fingers, Release, Situation, Step
 from guided_lgp.bounds.path.spaces import wound
@@ -193,7 +193,8 @@ class OutcomeSampler:
         leaving = task.arms[action.way_out.gripper]
         start, tool = situation.q[arm.arm.slice], solutions.tool(choice)
         around = situation.around(gripper, [(action.body, action.parent)])
-        line = self._line(index, Stage.LINE_IN, around, tool, solutions.way[choice[0]])
+        straight = task.mover.line(around, tool, solutions.way[choice[0]])
+        line = self._free(index, Stage.LINE_IN, straight)
         if line is None:
             return None
         # Full turns of a joint move the hand in the last bit only, but what is let go of keeps it.
@@ -227,26 +228,23 @@ class OutcomeSampler:
         task, action = self._task, self._task.manoeuvres[index]
         around = switched.around(action.way_out.gripper, [(action.body, self._parent(index))])
         at_end = switched.around(action.way_out.gripper)
-        ways = action.ways_out(tool.rotation)
-        for way, shift in product(ways, task.shifts(action.way_out.gripper)):
-            out = self._line(index, Stage.LINE_OUT, around, tool, way.of(tool.rotation), shift)
-            if out is not None and not task.blocked(
-                index, Stage.OUT, "after the contact", at_end, out[-1:]
-            ):
-                yield out
+        shifts = task.shifts(action.way_out.gripper)
+        for way in action.ways_out(tool.rotation):
+            for line in task.mover.lines(around, tool, way.of(tool.rotation), shifts):
+                out = self._free(index, Stage.LINE_OUT, line)
+                if out is not None and not task.blocked(
+                    index, Stage.OUT, "after the contact", at_end, out[-1:]
+                ):
+                    yield out
 
-    def _line(
+    def _free(
         self,
         index: int,
         stage: Literal[Stage.LINE_IN, Stage.LINE_OUT],
-        around: Surroundings,
-        tool: Tool,
-        direction: Array,
-        shift: float = 0.0,
+        line: Array | Pair | None,
     ) -> Array | None:
-        """A free straight line of a tool, or None, and what is wrong with it is remembered."""
+        """A line if it is free, or None, and what is wrong with it is remembered."""
         where = "on the way in" if stage == Stage.LINE_IN else "on the way out"
-        line = self._task.mover.line(around, tool, direction, shift)
         if line is None:
             self._task.record(index, stage, f"out of reach {where}")
         elif isinstance(line, tuple):

@@ -230,8 +230,10 @@ class Task:
             positions,
             np.broadcast_to(values, (len(contact), 2, len(values))),
         )
-        distance = np.linalg.norm((q[:, 1] - arm.arm.home) * arm.arm.metric, axis=-1)
-        cost = np.where(valid.all(axis=1), distance, np.inf)
+        within = valid.all(axis=1)  # a twelfth of them
+        cost = np.full(within.shape, np.inf)
+        from_home = (q[:, 1][within] - arm.arm.home) * arm.arm.metric
+        cost[within] = np.linalg.norm(from_home, axis=-1)
         return IkSolutions(rotation, contact, way, q, values, cost)
 
     def level_solutions(

@@ -55,11 +55,14 @@ class Phase:
         return self._start | {box: poses[sample] for box, poses in self._moving.items()}
 
     def overlaps(self, world: World, sample: int) -> list[Penetration]:
-        """What the world finds at a sample, whatever its depth, deepest first."""
+        """What the world finds at a sample, whatever its depth, deepest first.
+
+        Bodies and what they stand on may touch, so that they are not measured.
+        """
         fingers = self._robot.finger_values(self.q[sample])
         boxes = {box: poses[sample] for box, poses in self._moving.items()}
         world.set(self.q[sample, : self._arms], boxes if sample else self.boxes_at(0), fingers)
-        return world.penetrations(0.0)
+        return world.penetrations(0.0, self.state.support)
 
     def tools_at(self, sample: int) -> dict[str, Array]:
         """Pose (7,) of all tool frames."""
@@ -139,6 +142,12 @@ def _at_steps(samples: Array, ways: Array, step: float) -> Array:
     """The polyline (T, d) anew, at equal steps of at most ``step`` along ways (T - 1,)."""
     way = np.r_[0.0, np.cumsum(ways)]
     marks = np.linspace(0.0, way[-1], int(np.ceil(way[-1] / step)) + 1)
-    fine = np.stack([np.interp(marks, way, column) for column in samples.T], axis=1)
+    if len(samples) == 1:
+        return samples
+    at = np.clip(np.searchsorted(way, marks, side="right") - 1, 0, len(way) - 2)
+    gap = way[at + 1] - way[at]
+    gap[gap == 0.0] = 1.0  # at the very end alone
+    slope = (samples[at + 1] - samples[at]) / gap[:, None]
+    fine: Array = slope * (marks - way[at])[:, None] + samples[at]
     fine[0], fine[-1] = samples[0], samples[-1]
     return fine

@@ -149,8 +149,10 @@ class OffsetShoulder:
         if not valid[:, branch].all():
             return None
         path = q[:, branch].copy()
-        path[:, _CONTINUOUS] = np.unwrap(path[:, _CONTINUOUS], axis=0)
-        return None if np.abs(np.diff(path, axis=0)).max(initial=0.0) > _JUMP else path
+        if _jumps(path):
+            path[:, _CONTINUOUS] = np.unwrap(path[:, _CONTINUOUS], axis=0)
+            return None if _jumps(path) else path
+        return path
 
     def redundancies(self, count: int) -> Array:
         """Values (count,) of the pan joint (rad) at which solutions are looked for."""
@@ -189,6 +191,10 @@ class OffsetShoulder:
         frame = _turn(frame, 0, c[..., 6], s[..., 6])
         origin = origin + hand * frame[..., :, 0]
         return self._mirror @ frame @ self._mirror, self.shoulder + origin @ self._mirror
+
+
+def _jumps(path: Array) -> bool:
+    return bool(np.abs(path[1:] - path[:-1]).max(initial=0.0) > _JUMP)
 
 
 def _turn(frame: Array, axis: int, cosine: Array, sine: Array) -> Array:
