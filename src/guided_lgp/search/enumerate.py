@@ -61,7 +61,8 @@ def _nearest(distances: Sequence[Mapping[int, int]]) -> dict[int, int]:
     nearest: dict[int, int] = {}
     for distance in distances:
         for state, steps in distance.items():
-            nearest[state] = min(steps, nearest.get(state, steps))
+            if steps < nearest.get(state, steps + 1):
+                nearest[state] = steps
     return nearest
 
 

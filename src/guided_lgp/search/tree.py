@@ -24,6 +24,7 @@ class StateSpace:
         self._number = {self._packed[0]: 0}
         self.expanded: dict[int, list[int]] = {}
         """Where the transitions out of the states that were expanded lead to."""
+        self._predecessors: tuple[int, list[list[int]]] = 0, []
 
     def __len__(self) -> int:
         return len(self._packed)
@@ -65,6 +66,17 @@ class StateSpace:
         for state, _ in enumerate(self._packed):  # the list grows on the way
             self.targets(state)
 
+    def predecessors(self) -> list[list[int]]:
+        """From where a transition leads to each state, among those that were expanded."""
+        counted, found = self._predecessors
+        if counted != len(self.expanded):
+            found = [[] for _ in range(len(self))]
+            for state, targets in self.expanded.items():
+                for target in targets:
+                    found[target].append(state)
+            self._predecessors = len(self.expanded), found
+        return found
+
     def goal_states(self, objective: Objective) -> "GoalStates":
         """The states that satisfy an objective."""
         return GoalStates(self._packed, self._packing.goal_test(objective))
@@ -86,11 +98,7 @@ class GoalStates:
 
 def distances(space: StateSpace, objective: Objective) -> dict[int, int]:
     """Least number of actions to the objective, from every state that is known to reach it."""
-    predecessors: list[list[int]] = [[] for _ in range(len(space))]
-    for state, targets in space.expanded.items():
-        for target in targets:
-            predecessors[target].append(state)
-    goals = space.goal_states(objective)
+    predecessors, goals = space.predecessors(), space.goal_states(objective)
     distance = {state: 0 for state in range(len(space)) if state in goals}
     queue = deque(distance)
     while queue:

@@ -18,7 +18,7 @@ from guided_lgp.bounds.program.geometry import GraspSide, SceneGeometry
 from guided_lgp.bounds.program.grasp import INSET, PALM_GAP, grasp_sides
 from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.bounds.results import Array
-from guided_lgp.logic import Skeleton, State, successor
+from guided_lgp.logic import Action, Skeleton, State, successor
 from guided_lgp.logic.domain import GroundInstruction
 from guided_lgp.scene.tolerances import GRASP_ANGLE, GRASP_OFFSET
 
@@ -52,6 +52,7 @@ class Facts:
         self._limbs = {name: Limb.of(arm, robot.fixed_values) for name, arm in self._arms.items()}
         self._known: dict[Hold, bool] = {}
         self._walked = lru_cache(_KEPT)(self._walk)
+        self._asked = lru_cache(_KEPT)(self._held)
 
     def impossible(self, skeleton: Skeleton) -> Hold | None:
         """What makes the last action of a skeleton impossible, as far as facts go."""
@@ -79,7 +80,7 @@ class Facts:
 
     def never(self, ground: GroundInstruction) -> bool:
         """Whether a body cannot be put on furniture, whatever has happened before."""
-        return any(map(self.out_of_reach, self._held(ground, ground.parent, loaded=True)))
+        return any(map(self.out_of_reach, self._asked(ground.action, ground.parent, loaded=True)))
 
     def _holds(self, skeleton: Skeleton) -> Iterator[Hold]:
         """What the last action asks of its arms, where it is known where its body stands."""
@@ -88,16 +89,15 @@ class Facts:
         loaded = bool(state.carried_by(last.body))
         if last.parent not in self._arms:
             if last.parent not in moved:
-                yield from self._held(last, last.parent, loaded)
+                yield from self._asked(last.action, last.parent, loaded)
         elif last.body not in moved:
-            yield from self._held(last, None)
+            yield from self._asked(last.action, None)
         elif (support := moved[last.body]) is not None:
-            yield from self._held(last, support)
+            yield from self._asked(last.action, support)
 
-    def _held(
-        self, ground: GroundInstruction, support: str | None, loaded: bool = False
-    ) -> Iterator[Hold]:
+    def _held(self, action: Action, support: str | None, loaded: bool = False) -> tuple[Hold, ...]:
         """What an action asks of each arm that holds its body at the contact."""
+        ground, found = self._geometry.domain.bind(action), []
         for term in ground.contact:
             if term.name == "hold" and term.symbols[1] == ground.body:
                 gripper = term.symbols[0]
@@ -105,7 +105,8 @@ class Facts:
                 own = tuple(line for line in lines if line.gripper == gripper)
                 if self._geometry.overhung:  # what comes from above may take a low way instead
                     own = tuple(line for line in own if not line.up)
-                yield Hold(gripper, ground.body, support, own, loaded)
+                found.append(Hold(gripper, ground.body, support, own, loaded))
+        return tuple(found)
 
     def _walk(self, skeleton: Skeleton) -> tuple[dict[str, str | None], State]:
         """Where actions bring what they move, and the state after them.

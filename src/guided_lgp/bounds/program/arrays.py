@@ -91,6 +91,16 @@ class Instances:
     """Of all inputs."""
 
 
+@dataclass(frozen=True)
+class Variables:
+    """Variables in which rows of one configuration alone meet; see ``ProgramBuilder.variable``."""
+
+    lower: "array[float]"
+    upper: "array[float]"
+    weight: "array[float]"
+    target: "array[float]"
+
+
 class ProgramBuilder:
     """Collects variables, constants and kernel instances."""
 
@@ -120,25 +130,33 @@ class ProgramBuilder:
         self.constants.append(value)
         return -len(self.constants)
 
-    def variable(
-        self, lower: float, upper: float, weight: float, target: float, shared: bool = True
-    ) -> int:
-        """The slot of a new variable.
+    def variable(self, lower: float, upper: float, weight: float, target: float) -> int:
+        """The slot of a new variable in which rows of several configurations meet.
+
+        All others are eliminated before it, which keeps the factorisation sparse.
 
         Args:
             lower: bound.
             upper: bound.
             weight: of the squared distance from the target.
             target: where the variable is drawn to.
-            shared: whether rows of several configurations meet in it; the others are eliminated
-                first, which keeps the factorisation sparse.
         """
         self._lower.append(lower)
         self._upper.append(upper)
         self._weight.append(weight)
         self._target.append(target)
-        self._shared.append(shared)
+        self._shared.append(1)
         return len(self._lower) - 1
+
+    def variables(self, added: Variables) -> range:
+        """The slots of new variables."""
+        first = len(self._lower)
+        self._lower.extend(added.lower)
+        self._upper.extend(added.upper)
+        self._weight.extend(added.weight)
+        self._target.extend(added.target)
+        self._shared.extend(bytes(len(added.lower)))
+        return range(first, len(self._lower))
 
     def rows(
         self,
@@ -175,19 +193,19 @@ class ProgramBuilder:
         """The program."""
         count = len(self._lower)
         kernel = np.array(self._kernel)
-        starts = np.zeros((len(kernel) + 1, 3), dtype=np.intc)
-        np.cumsum(self._table.sizes[kernel], axis=0, out=starts[1:])
+        starts = np.zeros((3, len(kernel) + 1), dtype=np.intc)
+        np.cumsum(self._table.sizes[:, kernel], axis=1, out=starts[:, 1:])
         inputs = np.array(self._inputs)
-        inputs = np.where(inputs < 0, count - 1 - inputs, inputs).astype(np.intc)
+        inputs = np.where(inputs < 0, count - 1 - inputs, inputs)
         order = np.empty(count, dtype=np.intc)
         order[np.argsort(self._shared, kind="stable")] = np.arange(count)
         return Program(
             kernel=kernel,
-            input_start=_column(starts, 0),
+            input_start=starts[0],
             inputs=inputs,
             levers=np.array(self._levers),
-            parameter_start=_column(starts, 1),
-            row_start=_column(starts, 2),
+            parameter_start=starts[1],
+            row_start=starts[2],
             parameters=np.array(self._parameters),
             weight=np.array(self._weight),
             target=np.array(self._target),
@@ -195,7 +213,3 @@ class ProgramBuilder:
             upper=np.array(self._upper),
             order=order,
         )
-
-
-def _column(starts: Integers, column: int) -> Integers:
-    return np.ascontiguousarray(starts[:, column])

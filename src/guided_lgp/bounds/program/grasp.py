@@ -160,9 +160,15 @@ def in_tool(held: HeldBox, values: Array, palm_front: float) -> Array:
     pitch, offset, depth = values[list(held.grip)]
     extent = held.side.half_length * abs(np.cos(pitch)) + held.half_height * np.sin(pitch)
     level = np.array([0.0, -np.sin(pitch / 2), 0.0, np.cos(pitch / 2)])
-    turned = multiply(level, pose((0, 0, 0), -held.side.turn)[3:])
+    turned = multiply(level, _turned_back(held.side.turn))
     placement = np.array([extent + palm_front + depth, 0.0, offset, *turned])
     return compose(_rolled(1), placement) if held.side.flat else placement
+
+
+@lru_cache(maxsize=256)
+def _turned_back(turn: float) -> Array:
+    """Quaternion (4,) of the opposite turn about z (rad)."""
+    return pose((0, 0, 0), -turn)[3:]
 
 
 def read_grip(

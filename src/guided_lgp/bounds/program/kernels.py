@@ -109,8 +109,8 @@ class KernelTable(Generic[AnyKernel]):
         self.kernels = tuple(kernels)
         self.number = {kernel.name: index for index, kernel in enumerate(self.kernels)}
         """By the kernel's name."""
-        self.sizes = np.array([[k.inputs, k.parameters, k.rows] for k in self.kernels])
-        """(kernels, 3) numbers of inputs, parameters and rows."""
+        self.sizes = np.array([[k.inputs, k.parameters, k.rows] for k in self.kernels]).T.copy()
+        """(3, kernels) numbers of inputs, parameters and rows."""
 
     def __getitem__(self, number: int) -> AnyKernel:
         return self.kernels[number]

@@ -1,6 +1,7 @@
 """``balanced(box, support)``: the centres of mass of a stack are above what supports it."""
 
 from collections.abc import Mapping
+from functools import lru_cache
 
 import casadi as ca
 import numpy as np
@@ -57,8 +58,8 @@ def _add(context: Context, box: str, support: str) -> None:
 
 def _rows(context: Context, stack: tuple[str, ...], support: str) -> None:
     kernel_name, most = next(sums for sums in SUMS.items() if sums[1] >= len(stack))
-    masses = np.array([context.geometry.bodies[name].mass for name in stack])
-    shares = [*(masses / masses.sum()), *[0.0] * (most - len(stack))]
+    masses = tuple(context.geometry.bodies[name].mass for name in stack)
+    shares = (*_shares(masses), *[0.0] * (most - len(stack)))
     points = [slot for name in stack for slot in context.pose[name].plane[:2]]
     points += [ZERO] * (2 * most - len(points))
     context.rows(
@@ -67,6 +68,12 @@ def _rows(context: Context, stack: tuple[str, ...], support: str) -> None:
         (*inner(context, support, _height(context, stack[0])), *shares),
         ("balanced", stack[0], support),
     )
+
+
+@lru_cache(maxsize=256)
+def _shares(masses: tuple[float, ...]) -> tuple[float, ...]:
+    """Of the sum of some masses."""
+    return tuple((np.array(masses) / np.sum(masses)).tolist())
 
 
 def _height(context: Context, box: str) -> float:

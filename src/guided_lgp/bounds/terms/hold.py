@@ -5,13 +5,16 @@ pitch, offset and depth of the hand for the whole mode. The arm's joints are var
 configuration, and of the far end of each straight way to it or from it.
 """
 
+from array import array
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from functools import cache
 
 import casadi as ca
 import numpy as np
 
 from guided_lgp.bounds.checks import Pose, Vector, angle_of, axes_of, closing_axis, dot, offset_of
+from guided_lgp.bounds.program.arrays import Variables
 from guided_lgp.bounds.program.context import Context, Line
 from guided_lgp.bounds.program.draft import Draft
 from guided_lgp.bounds.program.geometry import GraspSide
@@ -27,7 +30,7 @@ from guided_lgp.bounds.program.grasp import (
     tool_target,
 )
 from guided_lgp.bounds.program.kernels import SCALE, Kernel, kernel
-from guided_lgp.bounds.program.kinematics import Chain, RobotKinematics
+from guided_lgp.bounds.program.kinematics import ArmKinematics, Chain, RobotKinematics
 from guided_lgp.bounds.program.slots import (
     ArmConfiguration,
     HeldBox,
@@ -197,13 +200,19 @@ def _joint_variables(
     """Slots of an arm's joints; at the end of a segment, the redundant one is the contact's."""
     arm = context.robot.arms[held.gripper]
     shared = None if contact is None else arm.arm.redundant
-    joints = []
-    for index, ((low, high), home) in enumerate(zip(arm.limits, arm.home, strict=True)):
-        if contact is not None and index == shared:
-            joints.append(contact[index])
-        else:
-            joints.append(context.program.variable(low, high, 1e-3, home, shared=False))
-    return tuple(joints)
+    own = tuple(context.program.variables(_joints(arm, shared)))
+    if contact is None or shared is None:
+        return own
+    return (*own[:shared], contact[shared], *own[shared:])
+
+
+@cache
+def _joints(arm: ArmKinematics, without: int | None) -> Variables:
+    """The variables of a configuration, but for one joint."""
+    kept = [i for i in range(len(arm.home)) if i != without]
+    lower, upper = (array("d", [arm.limits[i][end] for i in kept]) for end in (0, 1))
+    weight, target = array("d", [1e-3] * len(kept)), array("d", [arm.home[i] for i in kept])
+    return Variables(lower, upper, weight, target)
 
 
 def _rows(
