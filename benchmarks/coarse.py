@@ -124,9 +124,13 @@ def _one_start(sequence: Sequence) -> float:
     began = time.process_time()
     formulation = Formulator(geometry, Margins()).build(sequence.result.skeleton)
     warm_start = getattr(sequence.prefix, "values", None)
-    start = starts.draw(formulation, np.random.default_rng(0), 0.0, warm_start)
+    start = starts.draw(formulation, _random, 0.0, warm_start)
     solver.solve(formulation.program, start, Settings())
     return time.process_time() - began
+
+
+def _random() -> np.random.Generator:
+    return np.random.default_rng(0)
 
 
 def _against_ipopt(sequences: list[Sequence]) -> dict[str, Any]:
@@ -141,7 +145,7 @@ def _against_ipopt(sequences: list[Sequence]) -> dict[str, Any]:
     for sequence in sequences:
         geometry = SceneGeometry(sequence.scene)
         formulation = Formulator(geometry, Margins()).build(sequence.result.skeleton)
-        start = Starts(geometry, solver).draw(formulation, np.random.default_rng(0), noise=0.0)
+        start = Starts(geometry, solver).draw(formulation, _random, noise=0.0)
         programs.append((formulation.program, start))
     # before IPOPT, whose building leaves a memory in which the first solve is slow
     ours = [

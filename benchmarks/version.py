@@ -228,10 +228,10 @@ class Recorder:
     def __getattr__(self, name: str) -> Any:
         return getattr(self._solver, name)
 
-    def solve(self, program: Any, values: Any, settings: Any) -> Any:
+    def solve(self, program: Any, values: Any, settings: Any, *kept: int) -> Any:
         """As the solver does."""
-        self.last = program, np.array(values)
-        return self._solver.solve(program, values, settings)
+        self.last = program, np.array(values), kept
+        return self._solver.solve(program, values, settings, *kept)
 
 
 def step(setup: str, number: int, words: list[str], steps: int) -> dict[str, Any]:
@@ -243,12 +243,12 @@ def step(setup: str, number: int, words: list[str], steps: int) -> dict[str, Any
     recorder = Recorder(solver)
     bound = coarse.CoarseBound(place.scene, 1, recorder)
     bound.solve(skeleton, place.bounds.coarse(skeleton[:-1]))
-    program, values = recorder.last
+    program, values, kept = recorder.last
     noise = np.random.default_rng(0).normal(scale=0.1, size=len(program.lower))
     values[: len(noise)] = np.clip(values[: len(noise)] + noise, program.lower, program.upper)
     endless = replace(solvers.Settings(), tolerance=-1.0, steps=steps, patience=steps)
     began = time.process_time()
-    solution = solver.solve(program, values, endless)
+    solution = solver.solve(program, values, endless, *kept)
     seconds = (time.process_time() - began) / solution.steps
     return {"seconds": seconds, "variables": program.variables, "rows": program.rows}
 

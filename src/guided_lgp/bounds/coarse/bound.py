@@ -188,8 +188,7 @@ class CoarseBound:
         )
         check = partial(self._check, programs, formulation, variant, restarts=number + 1)
         if kept is not None and kept.values is not None and number == 0:
-            still = formulation.program.holding(kept.values)
-            solution = self._solver.solve(still, start, _BRIEF)
+            solution = self._solver.solve(formulation.program, start, _BRIEF, len(kept.values))
             if solution.converged(_BRIEF):
                 result = check(solution, prefix=kept)
                 if result.feasible:

@@ -19,7 +19,7 @@ static const kernel_type kernel_table[] = {KERNELS};
 static const function form_table[] = {FORMS}; /* closed forms */
 
 typedef struct {
-    int variables, instances, rows;
+    int variables, instances, rows, kept; /* variables that stay where they are, the first ones */
     const int *kernel, *input_start, *inputs;
     const double *levers; /* how much a row changes at most per unit of each input */
     const int *parameter_start, *row_start;
@@ -141,12 +141,17 @@ static int is_active(const program *nlp, int i, const double *c, const double *m
     return 0;
 }
 
+static int is_fixed(const program *nlp, int v)
+{
+    return v < nlp->kept || nlp->lower[v] == nlp->upper[v];
+}
+
 /* Whether no input of an instance is a variable that can move. */
 static int is_still(const program *nlp, int i)
 {
     const int *inputs = nlp->inputs + nlp->input_start[i];
     for (int j = 0; j < kernel_table[nlp->kernel[i]].inputs; j++)
-        if (inputs[j] < nlp->variables && nlp->lower[inputs[j]] < nlp->upper[inputs[j]])
+        if (inputs[j] < nlp->variables && !is_fixed(nlp, inputs[j]))
             return 0;
     return 1;
 }
@@ -265,7 +270,7 @@ int coarse_solve(const program *nlp, const settings *options, double *values, do
             linearise(nlp, values, c, multiplier, penalty, still, active, &shape, g, H);
             for (int v = 0; v < n; v++) {
                 int k = nlp->order[v];
-                held[k] = nlp->lower[v] == nlp->upper[v] ||
+                held[k] = is_fixed(nlp, v) ||
                           (values[v] <= nlp->lower[v] && g[k] > 0) ||
                           (values[v] >= nlp->upper[v] && g[k] < 0);
             }
@@ -276,7 +281,7 @@ int coarse_solve(const program *nlp, const settings *options, double *values, do
             while (!accepted && tried < options->steps) {
                 tried++;
                 if (step(n, &shape, H, g, held, damping, L, panel, places + 2 * n, d)) {
-                    for (int v = 0; v < n; v++)
+                    for (int v = nlp->kept; v < n; v++)
                         values[v] = fmin(fmax(old[v] + d[nlp->order[v]], nlp->lower[v]),
                                          nlp->upper[v]);
                     residuals(nlp, values, multiplier, penalty, &last, c_new);
@@ -376,16 +381,19 @@ void coarse_holds(int form, int outputs, const grid *g, double *joints, double *
 void coarse_least_costs(int form, int outputs, const grid *g, const double *none, double *costs)
 {
     double x[FORM_INPUTS], out[outputs];
+    int best = 0; /* of the last cell: tried first, it is likely to be good here, too */
     for (int cell = 0; cell < g->poses * g->pitches; cell++) {
         costs[cell] = HUGE_VAL;
-        for (int c = 0; c < g->candidates; c++) {
+        for (int tried = 0, first = best; tried < g->candidates; tried++) {
+            int c = (first + tried) % g->candidates;
             double sum = 0;
             fill(g, cell, c, x);
             for (int e = 0; e < g->ends && sum < costs[cell]; e++) {
                 evaluate(form, g, e, x, out);
                 sum += out[outputs - 1];
             }
-            costs[cell] = fmin(costs[cell], sum);
+            if (sum < costs[cell])
+                costs[cell] = sum, best = c;
         }
     }
 }

@@ -66,8 +66,15 @@ class Solution:
 class Solver(ClosedForms, Protocol):
     """Solves programs and closed-form inverse kinematics."""
 
-    def solve(self, program: Program, values: Array, settings: Settings) -> Solution:
-        """Solve from a start: values of the variables, then the constants."""
+    def solve(self, program: Program, values: Array, settings: Settings, kept: int = 0) -> Solution:
+        """Solve from a start.
+
+        Args:
+            program: the problem.
+            values: of the variables, then the constants.
+            settings: of the loop.
+            kept: how many variables, the first ones, stay where they are.
+        """
         ...
 
 
@@ -76,7 +83,7 @@ _COUNTS, _ARRAYS = ("variables", "instances", "rows"), tuple(f.name for f in fie
 
 class _CProgram(ctypes.Structure):
     _fields_ = (
-        *((name, ctypes.c_int) for name in _COUNTS),
+        *((name, ctypes.c_int) for name in (*_COUNTS, "kept")),
         *((name, ctypes.c_void_p) for name in _ARRAYS),
     )
 
@@ -120,13 +127,14 @@ class Compiled:
         arms = closed_form_arms(kinematics_of(robot))
         self._forms = {name: (i, 1 + len(arm.home)) for i, (name, arm) in enumerate(arms.items())}
 
-    def solve(self, program: Program, values: Array, settings: Settings) -> Solution:
+    def solve(self, program: Program, values: Array, settings: Settings, kept: int = 0) -> Solution:
         """See :class:`Solver`."""
         values = np.array(values, dtype=np.float64)
         residuals = np.empty(program.rows)
         worst = ctypes.c_double()
         header = _CProgram(
             *(getattr(program, name) for name in _COUNTS),
+            kept,
             *(address(getattr(program, name)) for name in _ARRAYS),
         )
         steps = self._solve(
@@ -164,10 +172,11 @@ class Interpreter:
         self._robot = kinematics_of(robot)
         self._table = kernel_table(self._robot)
 
-    def solve(self, program: Program, values: Array, settings: Settings) -> Solution:
+    def solve(self, program: Program, values: Array, settings: Settings, kept: int = 0) -> Solution:
         """See :class:`Solver`."""
         n = program.variables
         values = np.array(values, dtype=np.float64)
+        program = program.holding(values[:kept])
         equality = equalities(self._table, program)
         penalty, damping, tried = settings.penalty, settings.damping, 0
         multiplier = np.zeros(program.rows)

@@ -112,7 +112,9 @@ class ProgramBuilder:
         self._upper = array("d")
         self._weight = array("d")
         self._target = array("d")
-        self._shared = array("b")
+        self._order = array("i")
+        """Places among the variables of one configuration alone, or (negative) after all these."""
+        self._alone = self._shared = 0
         self._kernel = array("i")
         self._inputs = array("i")
         self._levers = array("d")
@@ -145,7 +147,8 @@ class ProgramBuilder:
         self._upper.append(upper)
         self._weight.append(weight)
         self._target.append(target)
-        self._shared.append(1)
+        self._shared += 1
+        self._order.append(-self._shared)
         return len(self._lower) - 1
 
     def variables(self, added: Variables) -> range:
@@ -155,7 +158,8 @@ class ProgramBuilder:
         self._upper.extend(added.upper)
         self._weight.extend(added.weight)
         self._target.extend(added.target)
-        self._shared.extend(bytes(len(added.lower)))
+        count, self._alone = self._alone, self._alone + len(added.lower)
+        self._order.extend(range(count, self._alone))
         return range(first, len(self._lower))
 
     def rows(
@@ -191,18 +195,13 @@ class ProgramBuilder:
 
     def build(self) -> Program:
         """The program."""
-        count = len(self._lower)
         kernel = np.array(self._kernel)
         starts = np.zeros((3, len(kernel) + 1), dtype=np.intc)
         np.cumsum(self._table.sizes[:, kernel], axis=1, out=starts[:, 1:])
-        inputs = np.array(self._inputs)
-        inputs = np.where(inputs < 0, count - 1 - inputs, inputs)
-        order = np.empty(count, dtype=np.intc)
-        order[np.argsort(self._shared, kind="stable")] = np.arange(count)
         return Program(
             kernel=kernel,
             input_start=starts[0],
-            inputs=inputs,
+            inputs=_after(self._inputs, len(self._lower)),
             levers=np.array(self._levers),
             parameter_start=starts[1],
             row_start=starts[2],
@@ -211,5 +210,11 @@ class ProgramBuilder:
             target=np.array(self._target),
             lower=np.array(self._lower),
             upper=np.array(self._upper),
-            order=order,
+            order=_after(self._order, self._alone),
         )
+
+
+def _after(places: "array[int]", count: int) -> Integers:
+    """Places of which negative ones, from -1 on, come after a number of others."""
+    found = np.array(places)
+    return np.where(found < 0, count - 1 - found, found)

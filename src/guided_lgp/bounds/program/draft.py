@@ -55,7 +55,11 @@ class Draft:
 
     def pose(self, pose: PlanarPose) -> Array:
         """x, y, yaw and z of a level body."""
-        return np.array(pose_values(self.values, self._variables, pose))
+        return np.array(self.place(pose))
+
+    def place(self, pose: PlanarPose) -> tuple[float, float, float, float]:
+        """The same in plain numbers."""
+        return pose_values(self.values, self._variables, pose)
 
     def choose(self, costs: Array) -> int:
         """The index of the least cost, or of another low one."""

@@ -4,7 +4,8 @@ A line, seen from above, separates the box and each neighbour that it meets on i
 angle is a variable of the pair. What ends below the box, or begins above its way, is none.
 """
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -36,12 +37,21 @@ class Separation:
     def start(self, draft: Draft) -> None:
         """The best direction along an axis of the boxes."""
         if self.angle >= draft.kept:
-            poses = draft.pose(self.first)[None], draft.pose(self.second)
-            draft.values[self.angle] = _separation(*poses, self.halves)[1][0]
+            poses = draft.place(self.first), draft.place(self.second)
+            draft.values[self.angle] = _separation(*poses, self.halves)[1]
 
     def overlap(self, draft: Draft, first: Array) -> Array:
         """How much (n,) in m the first box, if it stood there (n, 4), would overlap the second."""
-        return np.maximum(0.0, -_separation(first, draft.pose(self.second), self.halves)[0])
+        second, (a, b, c, d) = draft.place(self.second), self.halves
+        reach = math.hypot(a, b) + math.hypot(c, d)
+        return np.array(
+            [
+                max(0.0, -_separation(place, second, self.halves)[0])
+                if math.dist(place[:2], second[:2]) < reach
+                else 0.0
+                for place in first.tolist()
+            ]
+        )
 
 
 def _kernels(robot: RobotKinematics) -> tuple[Kernel, ...]:
@@ -99,23 +109,27 @@ def _separate(context: Context, name: str, other: str) -> None:
 
 
 def _separation(
-    first: Array, second: Array, halves: tuple[float, float, float, float]
-) -> tuple[Array, Array]:
+    first: Sequence[float], second: Sequence[float], halves: tuple[float, float, float, float]
+) -> tuple[float, float]:
     """Largest distance (m) along the boxes' axes that separates them, and that direction (rad).
 
-    Both (n,), for poses (n, 4) of the first box.
+    In plain numbers: for two places many times faster than with arrays.
     """
-    angles = np.empty((len(first), 8))
-    angles[:, :4], angles[:, 4:] = first[:, 2:3] + _QUARTERS, second[2] + _QUARTERS
-    x, y = (second[:2] - first[:, :2]).T[..., None]
-    distance = x * np.cos(angles) + y * np.sin(angles)
-    for yaw, (hx, hy) in ((first[:, 2:3], halves[:2]), (second[2], halves[2:])):
-        distance = distance - hx * np.abs(np.cos(angles - yaw)) - hy * np.abs(np.sin(angles - yaw))
-    best = np.arange(len(first)), np.argmax(distance, axis=1)
-    return distance[best], angles[best]
+    dx, dy = second[0] - first[0], second[1] - first[1]
+    best, direction = -math.inf, 0.0
+    for yaw in (first[2], second[2]):
+        for quarter in _QUARTERS:
+            angle = yaw + quarter
+            distance = dx * math.cos(angle) + dy * math.sin(angle)
+            for turn, along, across in ((first[2], *halves[:2]), (second[2], *halves[2:])):
+                distance = distance - along * abs(math.cos(angle - turn))
+                distance = distance - across * abs(math.sin(angle - turn))
+            if distance > best:
+                best, direction = distance, angle
+    return best, direction
 
 
-_QUARTERS = np.arange(4) * np.pi / 2
+_QUARTERS = (0.0, np.pi / 2, np.pi, 3 * np.pi / 2)
 
 
 def _needed(one: Instruction) -> Iterator[tuple[Variable, ...]]:
