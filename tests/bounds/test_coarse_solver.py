@@ -84,7 +84,7 @@ def test_compiled_and_interpreted_loops_agree(skeleton: str) -> None:
     formulation = Formulator(geometry, Margins()).build(parse_skeleton(skeleton))
     fast, slow = _compiled(), Interpreter(load_robot("pr2"))
     rng = np.random.default_rng(3)
-    start = Starts(geometry, fast).draw(formulation, rng, noise=0.3)
+    start = Starts(geometry, fast).draw(formulation, lambda: rng, noise=0.3)
     one = fast.solve(formulation.program, start, settings)
     other = slow.solve(formulation.program, start, settings)
     assert one.steps == other.steps

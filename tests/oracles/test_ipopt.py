@@ -1,5 +1,7 @@
 """IPOPT on the same nonlinear programs: an independent judge of the compiled solver."""
 
+from functools import cache, partial
+
 import numpy as np
 import pytest
 
@@ -45,7 +47,9 @@ def _oracle(skeleton: str) -> tuple[Formulation, Solution]:
     solutions = []
     oracle = None
     for seed in range(_STARTS):
-        start = starts.draw(formulation, np.random.default_rng(seed), noise=0.1 * seed)
+        start = starts.draw(
+            formulation, cache(partial(np.random.default_rng, seed)), noise=0.1 * seed
+        )
         oracle = oracle or Ipopt(load_robot("pr2"), formulation.program, start, SETTINGS)
         solutions.append(oracle.solve(start))
         if solutions[-1].converged(SETTINGS):
