@@ -117,7 +117,7 @@ def verify_keyframes(
     Returns:
         The first violation with its action, or None.
     """
-    state = _progress(world.scene.state, skeleton[:verified])
+    state = progress(world.scene.state, skeleton[:verified])
     last = _last_before(world.scene, after_action[:verified])
     pairs = zip(at_switch[verified:], after_action[verified:], strict=True)
     frames = iter(_reached(world.scene, [frame for pair in pairs for frame in pair]))
@@ -132,12 +132,6 @@ def verify_keyframes(
             last = _REACHED[reached.keyframe] = reached
         state = after
     return None
-
-
-@lru_cache(maxsize=256)
-def _progress(state: State, actions: Skeleton) -> State:
-    """Kept, since many sequences begin alike."""
-    return progress(state, actions)
 
 
 def _last_before(scene: Scene, after_action: Sequence[Keyframe]) -> "_Reached":
