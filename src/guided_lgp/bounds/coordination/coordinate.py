@@ -4,11 +4,12 @@ import time
 from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
+from itertools import product
 from math import isnan
 
 from guided_lgp.bounds.coordination.itinerary import Itinerary, itinerary
 from guided_lgp.bounds.coordination.moments import Moments
-from guided_lgp.bounds.coordination.roads import Road
+from guided_lgp.bounds.coordination.roads import NEAR, Road
 from guided_lgp.bounds.coordination.schedule import schedule
 from guided_lgp.bounds.coordination.timetable import Timetable
 from guided_lgp.bounds.deadline import NEVER, Deadline, OutOfTimeError
@@ -70,19 +71,21 @@ class Coordinator:
         plan = itinerary(
             self._start, result.skeleton, result.steps, self._mover.arms, self._in_order
         )
-        for unwinds in (True, False):
+        for unwinds, near in product((True, False), NEAR):
             with suppress(OutOfTimeError):
-                motion = self._scheduled(result.skeleton, plan, unwinds)
+                motion = self._scheduled(result.skeleton, plan, unwinds, near)
                 if motion is not None:
                     elapsed = result.time_s + time.perf_counter() - began
                     return replace(motion, steps=result.steps, time_s=elapsed)
         return result
 
-    def _scheduled(self, skeleton: Skeleton, plan: Itinerary, unwinds: bool) -> PathResult | None:
+    def _scheduled(
+        self, skeleton: Skeleton, plan: Itinerary, unwinds: bool, near: float
+    ) -> PathResult | None:
         """A verified motion by the ways of all arms."""
         busy = sum(len(stops) > 1 for stops in plan.stops.values())
         roads = {
-            gripper: Road(self._mover, gripper, stops, busy > 1, unwinds)
+            gripper: Road(self._mover, gripper, stops, busy > 1, unwinds, near)
             for gripper, stops in plan.stops.items()
         }
         moments = Moments(self._scene, roads, plan)

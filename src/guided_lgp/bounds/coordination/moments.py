@@ -72,12 +72,17 @@ class Moments:
 
     def _judge(self, moments: Sequence[Moment], some: Sequence[int]) -> bool:
         """Whether some of the moments are clear between which no action takes effect."""
-        if not some:
-            return True
-        self._checker.enter(self._scene(moments[0]))
-        clear = self._checker.free(self._rows(moments[0], np.array(some)))
-        self._clear |= zip((moments[tick] for tick in some), clear.tolist(), strict=True)
-        return bool(clear.all())
+        by_contacts: dict[frozenset[int], list[int]] = {}
+        for tick in some:
+            by_contacts.setdefault(self._contacts(moments[tick]), []).append(tick)
+        done = self._done(moments[0])
+        for contacts, ticks in by_contacts.items():
+            self._checker.enter(self._scene(done, contacts))
+            clear = self._checker.free(self._rows(moments[0], np.array(ticks)))
+            self._clear |= zip((moments[tick] for tick in ticks), clear.tolist(), strict=True)
+            if not clear.all():
+                return False
+        return True
 
     def _rows(self, moment: Moment, ticks: NDArray[np.int_]) -> Array:
         """All moving joints (m, joints), some ticks (m,) after a moment."""
@@ -93,19 +98,27 @@ class Moments:
             rows[:, arm.slice], rows[:, arm.fingers.slice] = q, values
         return rows
 
-    def _scene(self, moment: Moment) -> PlanningScene:
-        """What is where, and what may touch."""
-        done = frozenset(
+    def _done(self, moment: Moment) -> frozenset[int]:
+        """The actions that have taken effect."""
+        return frozenset(
             action
             for actions, over in zip(self._actions, self.over(moment), strict=True)
             for number, action in actions.items()
             if number <= over and action is not None
         )
-        contacts = frozenset(
+
+    def _contacts(self, moment: Moment) -> frozenset[int]:
+        """The actions in whose contacts hands are, or near which."""
+        return frozenset(
             contact
-            for road, (where, _) in zip(self._roads, moment, strict=True)
-            for contact in (road.contacts(where) if isinstance(where, Node) else where.contacts)
+            for road, (where, row) in zip(self._roads, moment, strict=True)
+            for contact in (
+                road.contacts(where) if isinstance(where, Node) else where.contacts(row)
+            )
         )
+
+    def _scene(self, done: frozenset[int], contacts: frozenset[int]) -> PlanningScene:
+        """What is where, and what may touch."""
         if (done, contacts) not in self._scenes:
             self._scenes[done, contacts] = self._made(done, contacts)
         return self._scenes[done, contacts]

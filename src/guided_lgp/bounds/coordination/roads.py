@@ -28,9 +28,10 @@ _SLOWER = 1.15
 _OFF = 0.004
 """Distance (m) of either finger from the body between them at which the hand may move; planning
 keeps 3 mm from everything."""
-_NEAR = 0.2
+NEAR = (0.2, 1.0)
 """How far (m of the arm's motion) from a straight way fingers are as open as it asks for: free ways
-are looked for with such fingers, and come within 3 mm of the body."""
+are looked for with such fingers, and come within 3 mm of the body. The second is for plans in which
+they would touch it with the first."""
 
 
 class Place(IntEnum):
@@ -69,20 +70,37 @@ class Edge:
     """By gripper, the stop that must be over before it begins ..."""
     needs_at_end: Mapping[str, int]
     """... and before it ends."""
-    contacts: frozenset[int]
-    """The actions whose contacts are at its ends."""
+    leaves: frozenset[int]
+    """The action whose contact it leaves ..."""
+    left: int
+    """... and the first row that is away from it."""
+    comes: frozenset[int]
+    """The action to whose contact it comes ..."""
+    coming: int
+    """... and the last row that is away from that."""
 
     @property
     def ticks(self) -> int:
         """How long it takes."""
         return len(self.q) - 1
 
+    def contacts(self, row: int) -> frozenset[int]:
+        """The actions in whose contacts the hand is, or near which."""
+        leaves = self.leaves if row < self.left else frozenset[int]()
+        return leaves | self.comes if row > self.coming else leaves
+
 
 class Road:
     """All motions of one arm."""
 
     def __init__(
-        self, mover: Mover, gripper: str, stops: Sequence[Stop], waits: bool, unwinds: bool
+        self,
+        mover: Mover,
+        gripper: str,
+        stops: Sequence[Stop],
+        waits: bool,
+        unwinds: bool,
+        near: float = NEAR[0],
     ) -> None:
         """Prepare.
 
@@ -93,7 +111,9 @@ class Road:
             waits: whether there is another arm for which it may have to wait.
             unwinds: whether joints come to a stop by the best of their full turns, or by those that
                 the path bound has found.
+            near: how far from a straight way fingers are as open as it asks for.
         """
+        self._near = near
         self._arm = mover.arms[gripper].arm
         self._stops = stops
         self._waits = waits
@@ -145,7 +165,7 @@ class Road:
             yield from self._arriving(node, self._gaps[node.stop - 1].from_side, {})
         elif node.place == Place.BEFORE:
             into = self._gaps[node.stop - 1].into
-            yield from self._moving(node, Place.AT, Way((into,), len(into), 0), stop.way_in_after)
+            yield from self._moving(node, Place.AT, Way((into,), 0, len(into)), stop.way_in_after)
         elif node.stop < len(self._stops) - 1:
             yield from self._leaving(node)
         elif not self.is_end(node):
@@ -180,12 +200,13 @@ class Road:
         slower = self._stops[end.stop].slower
         for _ in range(_PATIENCE):
             q = self._timed(way, slower)
-            away = self._between(way, q, _NEAR)
+            away = self._between(way, q, self._near, end.place == Place.BEFORE)
             lacking = max(len(fingers[1]) - 1 - (away[1] - away[0]), 0)
             if not lacking or not self.contacts(node):
                 q = np.pad(q, ((lacking, 0), (0, 0)), mode="edge")
                 free, near = self._between(way, q), away[1] + lacking
-                yield self._edge(node, end, *self._together(q, free, near, *fingers), needs)
+                lead, q, values = self._together(q, free, near, *fingers)
+                yield self._edge(node, end, q, values, (lead + away[0], lead + near), needs)
                 return
             slower *= _SLOWER
 
@@ -206,9 +227,10 @@ class Road:
         opening: Array,
         between: Array,
         closing: Array,
-    ) -> tuple[Array, Array]:
-        """Rows of the arm and of the fingers: they move on the free way, until the hand is near; on
-        the straight ways, and before and after, they do so while the hand is at the body.
+    ) -> tuple[int, Array, Array]:
+        """Rows for which the arm waits at first, and rows of the arm and of the fingers: they move
+        on the free way, until the hand is near; on the straight ways, and before and after, they do
+        so while the hand is at the body.
         """
         first, last = free
         lead = len(opening) - 1 - min(self._clear(opening[::-1]), first)
@@ -217,7 +239,7 @@ class Road:
         values = _joined(
             (0, opening), (lead + near - len(between) + 1, between), (reached, closing)
         )
-        return np.pad(q, ((lead, rest), (0, 0)), mode="edge"), values
+        return lead, np.pad(q, ((lead, rest), (0, 0)), mode="edge"), values
 
     def _opening_from(self, node: Node) -> Array:
         """How the fingers (T,) leave what they have held; one value where they only go on."""
@@ -241,15 +263,19 @@ class Road:
         rows = np.concatenate([pieces[0], *(piece[1:] for piece in pieces[1:])])
         return rows if len(rows) > 1 else np.tile(rows, (2, 1))
 
-    def _between(self, way: Way, q: Array, farther: float = 0.0) -> tuple[int, int]:
+    def _between(
+        self, way: Way, q: Array, farther: float = 0.0, before: bool = False
+    ) -> tuple[int, int]:
         """The first and the last row (of T, n) off the straight ways at the ends, or farther (m)
-        from them, but for what is left of a short way.
+        from them, but for what is left of a short way; it may end before a straight way.
         """
         gone, left = _lengths(q, self._arm), _lengths(q[::-1], self._arm)[::-1]
         out = _lengths(way.pieces[0][: way.out], self._arm)[-1:].sum()
         into = _lengths(way.pieces[-1][len(way.pieces[-1]) - way.into :], self._arm)[-1:].sum()
         farther = min(farther, max(gone[-1] - out - into, 0.0) / 3)
-        out, into = (length and length + farther for length in (out, into))
+        out += farther if out else 0.0
+        into += farther if into or before else 0.0
+        out, into = min(out, gone[-1]), min(into, gone[-1])  # rows cut corners
         return int(np.argmax(gone >= out)), len(q) - 1 - int(np.argmax(left[::-1] >= into))
 
     def _opening(self, node: Node) -> Edge:
@@ -257,15 +283,22 @@ class Road:
         values = self._opening_from(node)
         q = np.tile(self._rests[node][0], (len(values), 1))
         needs = self._stops[node.stop].open_after
-        return self._edge(node, Node(node.stop, Place.OPENED), q, values, needs)
+        return self._edge(node, Node(node.stop, Place.OPENED), q, values, (len(q), -1), needs)
 
     def _edge(
-        self, start: Node, end: Node, q: Array, fingers: Array, needs: Mapping[str, int]
+        self,
+        start: Node,
+        end: Node,
+        q: Array,
+        fingers: Array,
+        free: tuple[int, int],
+        needs: Mapping[str, int],
     ) -> Edge:
         after = self._stops[end.stop].after if self.action(end) is not None else {}
-        contacts = self.contacts(start) | self.contacts(end)
+        leaves, comes = self.contacts(start), self.contacts(end)
         self._rests[end] = q[-1], float(fingers[-1])
-        return Edge(end, q, fingers, self.over(start), needs, after, contacts)
+        ends = leaves, free[0], comes, free[1]
+        return Edge(end, q, fingers, self.over(start), needs, after, *ends)
 
 
 def _joined(*parts: tuple[int, Array]) -> Array:

@@ -123,7 +123,7 @@ class Gap:
             before, after = (longest[0][len(lines[0]) - 1 :], longest[1][::-1][len(lines[1]) - 1 :])
             detour = np.concatenate([before, *found, after[::-1] - wound])
             detour += np.linspace(0.0, 1.0, len(detour))[:, None] * wound
-            path = self._free(transit, lines, detour)
+            path = self._free(transit, motions[0].transit, lines, detour)
             if path is not None:
                 whole = np.concatenate([lines[0], path[1:], lines[1][1:]])
                 return Way((whole,), _straight(out), _straight(into))
@@ -158,16 +158,23 @@ class Gap:
             return self._split(transit, out, paths, into)
         return [np.concatenate([out, path[1:], into[1:]])]
 
-    def _free(self, transit: Transit, lines: tuple[Array, Array], detour: Array) -> Array | None:
+    def _free(
+        self, transit: Transit, first: Transit | None, lines: tuple[Array, Array], detour: Array
+    ) -> Array | None:
         """The best free path (m, n) between two straight ways, begun from the line between them,
-        from a detour, or else from a path by samples.
+        from a detour, or else from a path by samples. At first it keeps clear of what is there
+        then, too: above all of what the hand leaves, which another one may take.
         """
+        assert first is not None
         beside = _lines(*lines)
-        guesses = self._guesses(transit, detour)
-        paths = (
-            optimal_path(self._mover, transit, guess, *beside, inset=_INSET) for guess in guesses
-        )
-        return next((path for path in paths if path is not None), None)
+        for guess in self._guesses(transit, detour):
+            path = optimal_path(self._mover, transit, guess, *beside, inset=_INSET)
+            if path is not None and (
+                first is transit
+                or self._mover.collision(first.surroundings, path[: len(path) // 3]) is None
+            ):
+                return path
+        return None
 
     def _guesses(self, transit: Transit, detour: Array) -> Iterator[Array]:
         if not transit.keep_level:
