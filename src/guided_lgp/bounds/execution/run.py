@@ -10,7 +10,7 @@ import numpy as np
 from guided_lgp.bounds.checks import Violation, box_bodies
 from guided_lgp.bounds.execution.conditions import AS_PLANNED, Conditions
 from guided_lgp.bounds.execution.forces import grips_of
-from guided_lgp.bounds.execution.hands import closing_rows, opening_rows, parts_of
+from guided_lgp.bounds.execution.hands import closing_rows, opening_rows
 from guided_lgp.bounds.execution.noise import misplaced
 from guided_lgp.bounds.execution.simulation import SETTLE_S, Simulation
 from guided_lgp.bounds.goals import GoalTerms
@@ -20,6 +20,7 @@ from guided_lgp.bounds.verify.geometry import grasp_faults
 from guided_lgp.errors import InputError
 from guided_lgp.logic import Goal, GroundAtom, Objective, Skeleton, State, successor
 from guided_lgp.poses import compose, inverse
+from guided_lgp.robots.hand_parts import parts_of
 from guided_lgp.scene import Scene
 from guided_lgp.scene.world import World, initial_poses
 
@@ -103,6 +104,8 @@ class Execution:
         self._world = World(scene)
         self._simulation = Simulation(self._world, conditions)
         self._held: dict[tuple[str, str], tuple[int | None, Array]] = {}
+        self._leaving: dict[tuple[str, str], list[str]] = {}
+        """Links of hands that let go of a box and are not yet out of it."""
         self._seen = initial_poses(scene)
         self._amiss = DEVIATIONS * conditions.noise
 
@@ -195,8 +198,13 @@ class Execution:
     def _events(
         self, state: State, skeleton: Skeleton, rows: Sequence[int], trajectory: Trajectory
     ) -> Iterator[tuple[int, Callable[[], str]]]:
-        """What happens at which row, in order: hands reach boxes, take them, let go and leave."""
-        found: list[tuple[int, int, Callable[[], str]]] = []
+        """What happens at which row, in order: hands reach boxes, take them, let go and leave.
+
+        At every row, fingers may have come clear of what they leave.
+        """
+        found: list[tuple[int, int, Callable[[], str]]] = [
+            (row, -1, self._come_clear) for row in range(len(trajectory.times))
+        ]
         last = dict.fromkeys(self._robot.grippers, 0)
         for index, (action, row) in enumerate(zip(skeleton, rows, strict=True)):
             before, state = state, successor(state, action)
@@ -224,6 +232,7 @@ class Execution:
         """The open hand is at the box; its links may pass through it until it has left again."""
         seen, self._seen[box] = self._seen[box], self._simulation.box(box)
         parts = parts_of(self._robot, gripper)
+        self._leaving.pop((gripper, box), None)
         fixed = self._conditions.grip == "fixed"
         links = self._robot.arms[gripper].hand_links if fixed else parts.between
         self._simulation.touch(links, box, allowed=False)
@@ -260,14 +269,28 @@ class Execution:
         """Nothing keeps the box in the hand any more."""
         constraint, _ = self._held.pop((gripper, box))
         if constraint is None:
-            self._simulation.relax(gripper)
+            self._simulation.relax(gripper, box)
         else:
             self._simulation.free(constraint)
 
     def _leave(self, gripper: str, box: str) -> str:
         """The fingers are open: what touches the box from now on pushes it."""
-        self._simulation.touch(self._robot.arms[gripper].hand_links, box, allowed=True)
+        links, parts = self._robot.arms[gripper].hand_links, parts_of(self._robot, gripper)
+        others = [link for link in links if link not in parts.between]
+        self._simulation.touch(others, box, allowed=True)
+        self._leaving[gripper, box] = list(parts.between)
         self._seen = self.boxes()
+        return self._come_clear()
+
+    def _come_clear(self) -> str:
+        """Links whose hulls bridge the hollow of the fingers count once they are out of the box.
+
+        Until then they would lift it, or throw it away.
+        """
+        for (_, box), links in self._leaving.items():
+            clear = [link for link in links if self._world.distance(link, box, KNOCK) > 0]
+            self._simulation.touch(clear, box, allowed=True)
+            links[:] = [link for link in links if link not in clear]
         return ""
 
     def _holds(self, atom: GroundAtom) -> bool:

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from guided_lgp.bounds.execution.conditions import Conditions
-from guided_lgp.bounds.execution.hands import parts_of
 from guided_lgp.bounds.results import Array, Trajectory
 from guided_lgp.bounds.verify.efforts import GRAVITY, own_weights
+from guided_lgp.robots.hand_parts import parts_of
 from guided_lgp.scene.bullet import pybullet
 from guided_lgp.scene.world import World
 
@@ -110,10 +110,17 @@ class Simulation:
         self._share_motors()
         self.rest(GRIP_S)
 
-    def relax(self, gripper: str) -> None:
-        """Let the fingers follow the motion again."""
+    def relax(self, gripper: str, box: str) -> None:
+        """Let the fingers follow the motion again, and go from the box that they pressed on.
+
+        Of a pad at an edge, Bullet may keep a contact point whose normal points into the finger:
+        with enough friction it would pull the box along as the finger leaves. So contacts are found
+        anew.
+        """
         del self._squeezing[gripper]
         self._share_motors()
+        for allowed in (False, True):
+            self.touch(parts_of(self._robot, gripper).pads, box, allowed)
 
     def put(self, box: str, placement: Array) -> None:
         """Move a box to a pose (7,), at rest."""
