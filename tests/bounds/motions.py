@@ -161,9 +161,10 @@ def grasp(motion: Motion, gripper: str, box: str) -> Array:
     body = next(b for b in motion.scene.boxes if b.name == box)
     tool = from_above(body, gripper)
     at = reach(motion.scene, gripper, tool)
-    above = reach(motion.scene, gripper, shifted(tool, z=0.10), at)
-    motion.move(gripper, above).move(gripper, at).hand(gripper, CLOSED).attach(box, gripper)
-    motion.move(gripper, above)
+    near = reach(motion.scene, gripper, shifted(tool, z=0.04), at)  # nearly straight from there on
+    above = reach(motion.scene, gripper, shifted(tool, z=0.10), near)
+    motion.move(gripper, above).move(gripper, near).move(gripper, at)
+    motion.hand(gripper, CLOSED).attach(box, gripper).move(gripper, near).move(gripper, above)
     return compose(inverse(tool), pose(body.position, body.yaw))
 
 

@@ -9,9 +9,11 @@ from motions import CLOSED, PALM_FRONT, PR2, Motion, from_above, grasp, place, r
 from grasp_poses import grasp_poses
 from guided_lgp.bounds.execution import Execution, execute
 from guided_lgp.bounds.results import Trajectory
+from guided_lgp.bounds.verify import verify_path
 from guided_lgp.logic import parse_objective, parse_skeleton
 from guided_lgp.poses import compose, pose
 from guided_lgp.scene import Scene
+from guided_lgp.scene.world import world_of
 
 STACK = parse_skeleton("(grasp pr2L red) (place pr2L red green)")
 STACKED = parse_objective(["(on red green)", "(on green tab1)"])
@@ -66,9 +68,13 @@ def test_a_hand_that_knocks_what_it_takes_is_refused_by_name(neighbours: Scene) 
     motion = Motion(neighbours).move("pr2L", above).move("pr2L", at).move("pr2L", aside)
     motion.hand("pr2L", CLOSED).attach("red", "pr2L").move("pr2L", above)
     objective = parse_objective(["(held red)"])
-    report = execute(neighbours, objective, STACK[:1], motion.trajectory(PERIOD))
+    trajectory = motion.trajectory(PERIOD)
+    report = execute(neighbours, objective, STACK[:1], trajectory)
     assert not report.success
     assert report.fault == "knock pr2L red"
+    violation = verify_path(world_of(neighbours), STACK[:1], trajectory).violation
+    assert violation is not None
+    assert violation.constraint == "clear l_gripper_r_finger_tip_link red"
 
 
 def test_a_tower_of_eight_stands() -> None:

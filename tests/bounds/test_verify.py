@@ -473,7 +473,7 @@ def test_thin_passage_between_two_samples_is_seen(world: World, two_boxes: Scene
 
 
 def test_carried_box_through_a_standing_one() -> None:
-    crowded = scene(red=(0.455, 0.30, 0.65, 0.0, "tab1"), green=(0.625, 0.30, 0.65, 0.0, "tab1"))
+    crowded = scene(red=(0.48, 0.30, 0.65, 0.0, "tab1"), green=(0.65, 0.30, 0.65, 0.0, "tab1"))
     motion = Motion(crowded)
     grasp(motion, "pr2L", "red")
     tool = shifted(from_above(crowded.boxes[0], "pr2L"), z=0.05)

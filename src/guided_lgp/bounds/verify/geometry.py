@@ -8,13 +8,16 @@ from guided_lgp.bounds.checks import Pose, Violation, box_sizes, top_of, turned_
 from guided_lgp.bounds.results import Array
 from guided_lgp.bounds.terms import balanced, hold, pads, stand
 from guided_lgp.robots import Arm, Robot
+from guided_lgp.robots.hand_parts import parts_of
 from guided_lgp.scene import Scene
 from guided_lgp.scene.shapes import Convex
+from guided_lgp.scene.tolerances import MARGIN
 from guided_lgp.scene.world import Penetration, initial_poses
 
 HAND_DEPTH = 0.02
 """How deep (m) a hull of the hand may reach into the box it holds, approaches or leaves. The
-hulls bridge the hollow of the fingers: on a box that fills the hand they overlap it by 15 mm."""
+hulls bridge the hollow of the fingers: on a box that fills the hand they overlap it by 15 mm. For
+fingertips, whose hulls end where the pads do, it is ``MARGIN``."""
 
 Stack = tuple[str, Pose | None, Mapping[str, Pose]]
 """What a box stands on, with its pose if it is a box, and the poses of all above that, by name."""
@@ -115,6 +118,8 @@ def declared(
     for one, other in ((overlap.first, overlap.second), (overlap.second, overlap.first)):
         if support.get(one) == other:
             return True
-        if any(one == box and other in robot.arms[g].hand_links for box, g in held):
-            return overlap.depth <= HAND_DEPTH
+        for gripper in (gripper for box, gripper in held if box == one):
+            if other in robot.arms[gripper].hand_links:
+                pad = other in parts_of(robot, gripper).pads
+                return overlap.depth <= (MARGIN if pad else HAND_DEPTH)
     return False
