@@ -113,20 +113,33 @@ class PackedStates:
         """Whether all goals hold in a packed state."""
         domain = self._symbols.domain
         atoms = [atom for goal in goals for atom in domain.conditions(goal)]
+        wanted, put = self._placed(atoms)
         tests = [(self._test(atom), not atom.negated) for atom in atoms if atom.predicate in TREE]
         modal = [atom for atom in atoms if atom.predicate not in TREE]
         modes: dict[int, bool] = {}
 
         def holds(packed: int) -> bool:
+            if packed & wanted != put:  # most states, at once
+                return False
             mode = packed >> self._mode_shift
             if mode not in modes:
                 modes[mode] = all(atom.holds_in(self._mode(mode)) for atom in modal)
             if not modes[mode]:
                 return False
             parents = self._parents(packed)
-            return all(test(parents) == wanted for test, wanted in tests)
+            return all(test(parents) == truth for test, truth in tests)
 
         return holds
+
+    def _placed(self, atoms: Sequence[GroundAtom]) -> tuple[int, int]:
+        """The bits that say what some bodies are on, and their values where atoms hold."""
+        wanted = put = 0
+        for atom in atoms:
+            if atom.predicate == "on" and not atom.negated:
+                body, parent = atom.symbols
+                wanted |= self._field << self._shift[body]
+                put |= self._number[parent] << self._shift[body]
+        return wanted, put
 
     def _parents(self, packed: int) -> list[int]:
         field = self._field

@@ -43,7 +43,7 @@ class _Graph:
         self._goals = space.goal_states(objective)
         self._max_size = max_size
         self._expanded = 0
-        self._goal_found = False
+        self._goal_found = 0 in self._goals
         self._sequence_nodes = 0
         self.excluded: set[Skeleton] = set()
 
@@ -53,14 +53,13 @@ class _Graph:
 
     def expand_layer(self) -> int:
         """Expand the states found last, up to the limit of the size; how many they were."""
-        layer = range(self._expanded, len(self._space))
-        for state in layer:
-            if self.size >= self._max_size:
-                break
-            targets = self._space.targets(state)
-            self._goal_found |= any(target in self._goals for target in targets)
+        known, begun = len(self._space), self._expanded
+        while self._expanded < known and self.size < self._max_size:
+            self._space.targets(self._expanded)
             self._expanded += 1
-        return self._expanded - layer.start
+        found = range(known, len(self._space))
+        self._goal_found = self._goal_found or any(state in self._goals for state in found)
+        return self._expanded - begun
 
     def sequences(self, length: int) -> Iterator[Skeleton]:
         """Sequences of one length to the objective that pass no excluded one."""

@@ -15,13 +15,27 @@ Transition = tuple[Action, int]
 """An applicable action and the number of the state it leads to."""
 
 
+class _Numbers(dict[int, int]):
+    """The numbers of packed states; one that is new gets the next, and is appended to a list."""
+
+    def __init__(self, packed: list[int]) -> None:
+        super().__init__()
+        self._packed = packed
+
+    def __missing__(self, packed: int) -> int:
+        number = self[packed] = len(self._packed)
+        self._packed.append(packed)
+        return number
+
+
 class StateSpace:
     """Symbolic states, numbered as they are discovered, and their transitions."""
 
     def __init__(self, symbols: Symbols, start: State) -> None:
         self._packing = packed_states(symbols)
-        self._packed = [self._packing.pack(start)]
-        self._number = {self._packed[0]: 0}
+        self._packed: list[int] = []
+        self._number = _Numbers(self._packed)
+        self._number[self._packing.pack(start)]
         self.expanded: dict[int, list[int]] = {}
         """Where the transitions out of the states that were expanded lead to."""
         self._predecessors: tuple[int, list[list[int]]] = 0, []
@@ -38,9 +52,8 @@ class StateSpace:
         known = self.expanded.get(state)
         if known is None:
             packed = self._packed[state]
-            known = self.expanded[state] = self._discover(
-                self._packing.moves(packed).targets(packed)
-            )
+            found = self._packing.moves(packed).targets(packed)
+            known = self.expanded[state] = list(map(self._number.__getitem__, found))
         return known
 
     def actions(self, state: int) -> tuple[Action, ...]:
@@ -50,16 +63,6 @@ class StateSpace:
     def transitions(self, state: int) -> tuple[Transition, ...]:
         """All transitions out of a state, in the fixed order of the logic tree."""
         return tuple(zip(self.actions(state), self.targets(state), strict=True))
-
-    def _discover(self, found: list[int]) -> list[int]:
-        """The numbers of packed states; new ones are appended."""
-        numbers = []
-        for packed in found:
-            number = self._number.setdefault(packed, len(self._packed))
-            if number == len(self._packed):
-                self._packed.append(packed)
-            numbers.append(number)
-        return numbers
 
     def explore(self) -> None:
         """Discover every reachable state; their number is finite and small."""
