@@ -129,8 +129,8 @@ def verify_keyframes(
             found = found or _slips(last, reached, modes)
             if found:
                 return Violation(found[0].constraint, found[0].amount, index)
-            last = _REACHED[reached.keyframe] = reached
-        state = after
+            last = reached
+        state, _REACHED[last.keyframe] = after, last
     return None
 
 
@@ -207,7 +207,7 @@ def _reached(scene: Scene, keyframes: Sequence[Keyframe]) -> list[_Reached]:
 
 
 _REACHED: WeakKeyDictionary[Keyframe, _Reached] = WeakKeyDictionary()
-"""What has been found good and may be gone on from."""
+"""What has been found good after an action and may be gone on from."""
 
 
 def _slips(last: _Reached, reached: _Reached, state: State) -> list[Violation]:
