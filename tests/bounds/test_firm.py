@@ -1,11 +1,9 @@
 """Of several motions the one whose grips hold is taken."""
 
-from collections.abc import Iterator
 from functools import cache
 
 import pytest
 
-from guided_lgp.bounds.deadline import OutOfTimeError
 from guided_lgp.bounds.execution.forces import RATIO, grips_of
 from guided_lgp.bounds.path.firm import firmest
 from guided_lgp.bounds.results import PathResult
@@ -39,20 +37,18 @@ def test_a_stack_is_held_where_the_pads_can_carry_it() -> None:
     assert load(motion(firm=True)) == pytest.approx(RATIO, abs=1e-6)
 
 
-def test_what_holds_best_is_taken_where_nothing_holds() -> None:
-    assert firmest(SCENE, iter([motion(firm=False)])) is motion(firm=False)
+def test_a_grip_that_does_not_hold_is_refused_by_name() -> None:
+    refused = firmest(SCENE, iter([motion(firm=False)]))
+    assert refused is not None
+    assert not refused.feasible
+    assert refused.failure is not None
+    assert refused.failure.constraint == "grip pr2R red"
+    assert refused.failure.action == 2
+    assert refused.failure.violation > 0.1
     assert firmest(SCENE, iter([])) is None
 
 
-@pytest.mark.parametrize("found", [True, False])
-def test_when_time_is_over_what_has_been_found_is_taken(found: bool) -> None:
-    def motions() -> Iterator[PathResult]:
-        if found:
-            yield motion(firm=False)
-        raise OutOfTimeError
-
-    if found:
-        assert firmest(SCENE, motions()) is motion(firm=False)
-    else:
-        with pytest.raises(OutOfTimeError):
-            firmest(SCENE, motions())
+def test_the_next_motion_is_taken_where_one_does_not_hold() -> None:
+    motions = iter([motion(firm=False), motion(firm=True), motion(firm=False)])
+    assert firmest(SCENE, motions) is motion(firm=True)
+    assert len(list(motions)) == 1

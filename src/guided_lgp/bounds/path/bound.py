@@ -65,7 +65,7 @@ class PathBound:
             solutions: largest number of coarse solutions to try.
             deadline: after which it gives up.
             goals: terms that the motion keeps.
-            firm: whether to look for grips that hold what the hands carry.
+            firm: whether grips have to hold what the hands carry.
             shorten: what makes a motion of the steps, where it can; else one arm moves at a time.
         """
         self._scene = scene

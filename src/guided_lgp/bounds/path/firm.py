@@ -2,9 +2,8 @@
 
 from collections.abc import Iterator
 
-from guided_lgp.bounds.deadline import OutOfTimeError
-from guided_lgp.bounds.execution.forces import RATIO, grips_of
-from guided_lgp.bounds.results import PathResult
+from guided_lgp.bounds.execution.forces import RATIO, Grip, grips_of
+from guided_lgp.bounds.results import Failure, PathResult
 from guided_lgp.bounds.verify.attachments import switches_of
 from guided_lgp.scene import Scene
 
@@ -13,33 +12,43 @@ _ROUNDING = 1e-6
 
 
 def firmest(scene: Scene, motions: Iterator[PathResult]) -> PathResult | None:
-    """The first motion whose grips hold, or else the one whose worst grip holds best.
+    """The first motion whose grips hold; if none does, which grip of the best one does not.
 
     Args:
         scene: the initial configuration.
-        motions: verified; no more of them are asked for than needed, nor when time is over.
-
-    Raises:
-        OutOfTimeError: before there was any motion.
+        motions: verified; no more of them are asked for than needed.
     """
-    best: tuple[float, PathResult] | None = None
-    try:
-        for motion in motions:
-            load = _load(scene, motion)
-            if best is None or load < best[0]:
-                best = load, motion
-            if load <= RATIO + _ROUNDING:
-                break
-    except OutOfTimeError:
-        if best is None:
-            raise
-    return best[1] if best else None
+    best: tuple[Grip, PathResult] | None = None
+    for motion in motions:
+        worst = _worst_grip(scene, motion)
+        if worst is None or worst.ratio <= RATIO + _ROUNDING:
+            return motion
+        if best is None or worst.ratio < best[0].ratio:
+            best = worst, motion
+    return _refused(scene, *best) if best else None
 
 
-def _load(scene: Scene, motion: PathResult) -> float:
-    """The largest share of what its pads can carry that any grip of a motion has to."""
+def _worst_grip(scene: Scene, motion: PathResult) -> Grip | None:
+    """The grip with the largest load, of those that the motion chooses."""
+    assert motion.trajectory is not None
+    grips = grips_of(scene, motion.skeleton, _switches(scene, motion), motion.trajectory)
+    chosen = [grip for grip in grips if grip.start > 0]
+    return max(chosen, key=lambda grip: grip.ratio, default=None)
+
+
+def _refused(scene: Scene, grip: Grip, motion: PathResult) -> PathResult:
+    """A motion with a grip whose pads would slip."""
+    failure = Failure(
+        action=_switches(scene, motion).index(grip.start),
+        constraint=f"grip {grip.gripper} {grip.box}",
+        violation=grip.ratio - RATIO,
+        tried="motions of several coarse solutions",
+    )
+    return PathResult(motion.skeleton, feasible=False, failure=failure)
+
+
+def _switches(scene: Scene, motion: PathResult) -> list[int]:
     assert motion.trajectory is not None
     rows = switches_of(scene, motion.skeleton, motion.trajectory)
     assert isinstance(rows, list)
-    grips = grips_of(scene, motion.skeleton, rows, motion.trajectory)
-    return max((grip.ratio for grip in grips), default=0.0)
+    return rows
