@@ -41,8 +41,8 @@ class SceneBounds:
         """Prepare a scene, for plans whose goals may say more than symbols.
 
         ``firm`` ones take, of the motions of several coarse solutions, the first whose grips hold
-        what the hands carry, or else the best: the paper asks for any motion, of one arm at a time
-        where ``shorten`` makes no other of it.
+        what the hands carry: the paper asks for any motion, of one arm at a time where ``shorten``
+        makes no other of it.
         """
         check_terms(scene.symbols.domain)
         check_motions(scene.symbols.domain)
