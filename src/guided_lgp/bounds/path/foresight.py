@@ -80,7 +80,9 @@ class Foresight:
         self, later: int, holder: str, targets: list[Place], grips: Grips
     ) -> IkSolutions:
         """Configurations for every target, and there for every grip."""
-        tools = [grips.tools(t.pose[:3], rotation_matrix(t.pose[3:])) for t in targets]
+        poses = np.array([target.pose for target in targets])
+        turns = rotation_matrix(poses[:, 3:])
+        tools = [grips.tools(*at) for at in zip(poses[:, :3], turns, strict=True)]
         rotation = np.concatenate([tool[0] for tool in tools])
         contact = np.concatenate([tool[1] for tool in tools])
         ways = [t.way.of(tool[0]) for t, tool in zip(targets, tools, strict=True)]

@@ -96,7 +96,8 @@ class IkSolutions:
     way: Array
     """(N, 3) from the contact to where the tool is off it (m)."""
     q: Array
-    """(N, 2, R, B, n): at the contact and off it, by redundant joint and branch."""
+    """(N, 2, R, B, n): at the contact and off it, by redundant joint and branch; zeros where none
+    is at the contact."""
     redundancies: Array
     """(R,) values of the redundant joint (rad)."""
     cost: Array
@@ -224,13 +225,12 @@ class Task:
     def _solved(
         arm: PlacedArm, rotation: Array, contact: Array, way: Array, values: Array
     ) -> IkSolutions:
-        positions = np.stack([contact, contact + way], axis=1)[:, :, None]
-        q, valid = arm.inverse(
-            rotation[:, None, None],
-            positions,
-            np.broadcast_to(values, (len(contact), 2, len(values))),
-        )
-        within = valid.all(axis=1)  # a twelfth of them
+        at, within = arm.inverse(rotation[:, None], contact[:, None], values)
+        pose, value = np.nonzero(within.any(axis=-1))  # few: only these are looked at off it
+        off, valid = arm.inverse(rotation[pose], (contact + way)[pose], values[value])
+        q = np.zeros((len(at), 2, *at.shape[1:]))
+        q[pose, 0, value], q[pose, 1, value] = at[pose, value], off
+        within[pose, value] &= valid
         cost = np.full(within.shape, np.inf)
         from_home = (q[:, 1][within] - arm.arm.home) * arm.arm.metric
         cost[within] = np.linalg.norm(from_home, axis=-1)

@@ -83,7 +83,7 @@ class InverseKinematics:
         position = np.broadcast_to(position, (*shape, 3)).reshape(-1, 3)
         q, missing = self._solver(rotation, position, np.broadcast_to(value, shape).ravel())
         q = self._within_turns(q)
-        return q.reshape(*shape, *q.shape[1:]), missing.reshape(*shape, -1)
+        return q.reshape(*shape, *q.shape[1:]), missing.reshape(*shape, q.shape[1])
 
     def follow(self, q: Array, valid: NDArray[np.bool_], branch: int) -> Array | None:
         """The solutions along a path as one motion that begins on a branch.

@@ -91,12 +91,16 @@ static void solve(const shoulder_arm *arm, const double *rotation, const double 
     }
 }
 
-/* Poses (count, 9), (count, 3) and values (count) to q (count, 2, 7) and valid (count, 2). */
-void inverse(const shoulder_arm *arm, int count, const double *rotation, const double *position,
-             const double *redundancy, double *q, unsigned char *valid)
+/* Values (count) of the redundant joint, so many for each of the poses (count / each, 9) and
+ * (count / each, 3), to q (count, 2, 7) and valid (count, 2). */
+void inverse(const shoulder_arm *arm, int count, int each, const double *rotation,
+             const double *position, const double *redundancy, double *q, unsigned char *valid)
 {
-    for (int n = 0; n < count; n++)
-        solve(arm, rotation + 9 * n, position + 3 * n, redundancy[n], q + 14 * n, valid + 2 * n);
+    for (int n = 0; n < count; n++) {
+        int pose = n / each;
+        solve(arm, rotation + 9 * pose, position + 3 * pose, redundancy[n], q + 14 * n,
+              valid + 2 * n);
+    }
 }
 
 /* frame times a rotation about one of its own axes. */

@@ -80,14 +80,20 @@ class OffsetShoulder:
         if library is None:
             return self.inverse_in_numpy(rotation, position, redundancy)
         shape = np.broadcast_shapes(rotation.shape[:-2], position.shape[:-1], redundancy.shape)
+        each = rotation.shape[-3:-2] == position.shape[-2:-1] == (1,)  # pose at all values
+        poses = (*shape[:-1], 1) if each else shape
         given = (
-            np.ascontiguousarray(np.broadcast_to(array, (*shape, *array.shape[array.ndim - own :])))
-            for array, own in ((rotation, 2), (position, 1), (redundancy, 0))
+            np.ascontiguousarray(np.broadcast_to(array, wanted))
+            for array, wanted in (
+                (rotation, (*poses, 3, 3)),
+                (position, (*poses, 3)),
+                (redundancy, shape),
+            )
         )
         q, valid = np.empty((*shape, 2, 7)), np.empty((*shape, 2), dtype=np.bool_)
         arrays = (*given, q, valid)
-        count = valid.size // 2
-        library.inverse(ctypes.byref(self._arm), count, *map(address, arrays))
+        count, values = valid.size // 2, shape[-1] if each else 1
+        library.inverse(ctypes.byref(self._arm), count, values, *map(address, arrays))
         return q, valid
 
     def inverse_in_numpy(
