@@ -63,21 +63,26 @@ def grips_of(
     loads = carried_boxes(scene, skeleton, switches, q)
     tools = scene.robot.tool_poses(q[:, : len(robot.joint_names)])
     held = spans(scene.state, skeleton, switches, len(q), lambda state: dict(state.held))
-    found = []
-    for span in sorted(held, key=lambda span: (span.start, span.gripper)):
-        fingers = robot.arms[span.gripper].fingers
-        own = next(load for load in loads if load.span.box == span.box and _during(load, span))
-        across = closing_axis(IDENTITY.tolist(), inverse(own.grip).tolist())
-        width = float(box_sizes(scene)[span.box][across])
-        riders = [load for load in loads if load.span.gripper == span.gripper]
-        riders = [load for load in riders if _during(load, span)]
-        radius = fingers.pad * _share_on_box(scene, own, across, fingers.pad)
-        need = _need(scene, tools[span.gripper], trajectory.times, riders, radius)
-        force = float(np.clip(need / RATIO, LEAST, max(fingers.force, LEAST)))
-        closing = fingers.value(width - SQUEEZE)
-        ratio = need / force
-        found.append(Grip(span.box, span.gripper, span.start, width, closing, force, ratio))
-    return found
+    return [
+        _grip(scene, span, loads, tools[span.gripper], trajectory.times)
+        for span in sorted(held, key=lambda span: (span.start, span.gripper))
+    ]
+
+
+def _grip(
+    scene: Scene, span: Attachment, loads: Sequence[Carried], tools: Array, times: Array
+) -> Grip:
+    """How a box is held for a span, by the loads of all hands and the poses (T, 7) of its tool."""
+    fingers = scene.robot.description.arms[span.gripper].fingers
+    own = next(load for load in loads if load.span.box == span.box and _during(load, span))
+    across = closing_axis(IDENTITY.tolist(), inverse(own.grip).tolist())
+    width = float(box_sizes(scene)[span.box][across])
+    riders = [load for load in loads if load.span.gripper == span.gripper and _during(load, span)]
+    radius = fingers.pad * _share_on_box(scene, own, across, fingers.pad)
+    need = _need(scene, tools, times, riders, radius)
+    force = float(np.clip(need / RATIO, LEAST, max(fingers.force, LEAST)))
+    closing = fingers.value(width - SQUEEZE)
+    return Grip(span.box, span.gripper, span.start, width, closing, force, need / force)
 
 
 def _during(load: Carried, span: Attachment) -> bool:
