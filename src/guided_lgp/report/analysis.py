@@ -155,19 +155,20 @@ def by_last_action(verdicts: pd.DataFrame, scenes: Mapping[str, Scene]) -> pd.Da
     """
     before: dict[tuple[str, str], State] = {}
     rows = []
+    symbols_of = {name: scene.symbols for name, scene in scenes.items()}
     columns = verdicts[["configuration", "skeleton", "feasible"]]
     for configuration, skeleton, feasible in columns.itertuples(index=False):
-        scene = scenes[configuration]
+        symbols = symbols_of[configuration]
         start = skeleton.rindex("(")
         prefix = skeleton[:start]
         state = before.get((configuration, prefix))
         if state is None:
-            state = progress(scene.state, parse_skeleton(prefix))
+            state = progress(scenes[configuration].state, parse_skeleton(prefix))
             before[configuration, prefix] = state
         (action,) = parse_skeleton(skeleton[start:])
-        ground = scene.symbols.domain.bind(action)
+        ground = symbols.domain.bind(action)
         table = state.parent_of(ground.body) if ground.into_hand else ground.parent
-        if table in scene.symbols.boxes:
+        if table in symbols.boxes:
             table = BOX if state.holder(table) is None else HELD_BOX
         rows.append((action.instruction, ground.actor, table, feasible))
     frame = pd.DataFrame(rows, columns=["instruction", "gripper", "table", "feasible"])
