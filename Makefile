@@ -6,11 +6,12 @@ BIN := $(CURDIR)/$(VENV)/bin
 INSTALLED := $(VENV)/.installed
 
 SHELF := .cache/shelf
+PEERS := .cache/peers
 
 export PATH := $(BIN):$(PATH)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: setup ship quick repro study cases test lint bench open-world shelf mlflow verify-determinism verify-interruption verify-load verify-hostile verify-execution sources reach
+.PHONY: setup ship quick repro study cases test lint bench bench-peers open-world shelf mlflow verify-determinism verify-interruption verify-load verify-hostile verify-execution sources reach
 
 setup: $(INSTALLED)
 
@@ -70,6 +71,15 @@ lint: setup
 bench: setup
 	dvc repro -q generate_scenes
 	python benchmarks/run.py
+
+# Keyframes of KOMO, in an environment of its own, beside the coarse bound: a minute.
+bench-peers: setup $(PEERS)/.installed
+	python benchmarks/run.py peers
+
+$(PEERS)/.installed: benchmarks/peers.txt
+	$(PYTHON) -m venv $(PEERS)
+	$(PEERS)/bin/pip install -qq --no-deps -r benchmarks/peers.txt
+	touch $@
 
 # 390 generated scenes of thirteen kinds, with and without a plan, whose truth is known: minutes.
 open-world: setup

@@ -78,7 +78,12 @@ FAMILIES = {
 
 def draw(robot: str, index: int) -> Scene:
     """The scene of a number: the same for everyone."""
-    family, rng = FAMILIES[robot], np.random.default_rng([SEED, index])
+    return draw_of(FAMILIES[robot], robot, index)
+
+
+def draw_of(family: Family, robot: str, index: int) -> Scene:
+    """The scene of a number, of any family."""
+    rng = np.random.default_rng([SEED, index])
     while True:
         boxes = tuple(_box(family, name, rng) for name in family.boxes)
         prints = [footprint(box) for box in boxes]

@@ -5,7 +5,8 @@ Writes ``geometry.json`` and ``benchmark.json`` to ``reports/metrics``, after ev
 
     python benchmarks/run.py [--count N] [PART ...]
 
-With parts named, the figures of the others stay.
+With parts named, the figures of the others stay. Those of ``peers`` always stay until it is named:
+that part needs an environment of its own, which ``make bench-peers`` installs before it measures.
 """
 
 import argparse
@@ -21,6 +22,7 @@ import against
 import coarse
 import limits
 import path
+import peers
 import pipeline
 import witness
 from guided_lgp.documents import read_json, write_json
@@ -60,15 +62,28 @@ MEASURES: dict[str, Callable[[int], Any]] = {
     "minutes": lambda count: pipeline.minutes(),
 }
 """By part, what measures it, given the number of sequences per length."""
+APART: dict[str, Callable[[int], Any]] = {"peers": lambda count: peers.measure()}
+"""Parts that are measured only when they are named."""
+
+
+def kept(target: Path, parts: list[str]) -> dict[str, Any]:
+    """What stays of an earlier run: all of it if parts are named, else what is measured apart."""
+    if not parts and not target.is_file():
+        return {}
+    before: dict[str, Any] = read_json(target, "an earlier run of all parts")
+    if parts:
+        return before
+    apart = {name: before[name] for name in APART if name in before}
+    return apart | {"measured_on": {name: before["measured_on"][name] for name in apart}}
 
 
 def main(parts: list[str], count: int) -> None:
     target = ROOT / METRICS / "benchmark.json"
-    figures = read_json(target, "an earlier run of all parts") if parts else {}
+    figures = kept(target, parts)
     figures["machine"] = machine()
     for name in parts or MEASURES:
         logger.info(name)
-        figures[name] = MEASURES[name](count)
+        figures[name] = (MEASURES | APART)[name](count)
         figures.setdefault("measured_on", {})[name] = figures["machine"]["cpu"]
         if name == "against":
             figures["speedup"] = against.ratios(figures[name])
@@ -86,9 +101,10 @@ def main(parts: list[str], count: int) -> None:
 if __name__ == "__main__":
     logging.basicConfig(format="%(message)s", level=logging.INFO)
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("parts", nargs="*", help="those to measure again, all by default")
+    parser.add_argument("parts", nargs="*", help="those to measure, by default all but peers")
     parser.add_argument("--count", type=int, default=100, help="sequences per length")
     arguments = parser.parse_args()
-    if unknown := set(arguments.parts) - set(MEASURES):
-        parser.error(f"no part {', '.join(sorted(unknown))}; there are {', '.join(MEASURES)}")
+    known = MEASURES | APART
+    if unknown := set(arguments.parts) - set(known):
+        parser.error(f"no part {', '.join(sorted(unknown))}; there are {', '.join(known)}")
     main(arguments.parts, arguments.count)

@@ -21,6 +21,30 @@ def cell(seconds: float | None, solved: int = 6) -> dict[str, float | int | None
     return {"problems": 6, "problems_solved": solved} | times
 
 
+def test_peers_are_told_beside_ours() -> None:
+    times = ("komo_scene", "komo", "ours_scene", "ours", "ours_last_action")
+    row = {f"{name}_ms": 10.0 * place for place, name in enumerate(times, start=1)}
+    row |= {"n": 40, "komo_first_start": 38, "komo": 39, "ours": 37, "komo_errors_max": 0.0123}
+    row |= {"only_komo": 2, "only_ours": 0}
+    metrics = {
+        "komo": {"near": {"2": row, "4": row | {"komo_errors_max": 0.0456}}},
+        "unsolved": {"komo_n": 2, "komo_ms": 1_234.4, "ours_n": 0, "ours_ms": None},
+        "checks_per_s": 2e6,
+        "path_ms_per_action": 23.45,
+        "published": [{"what": "Theirs", "figure": "35 µs", "source": "Their paper"}],
+    }
+    lines = benchmark_page({"machine": MACHINE, "peers": metrics}).splitlines()
+    figures = "40 | 38 | 39 | 37 | 2 | 0 | 10.0 | 20.0 | 30.0 | 40.0 | 50.0 |"
+    assert {f"| near | {length} | {figures}" for length in (2, 4)} <= set(lines)
+    note = next(line for line in lines if line.startswith("CPU time"))
+    assert "(near): 30 ms by KOMO, 70 ms by the coarse bound." in note
+    assert "Not solved: 2 (1,234 ms in the median) by KOMO, 0 (– ms in the median) by" in note
+    assert any("largest sum of both here is 0.046." in line for line in lines)
+    assert "| Theirs | 35 µs | Their paper |" in lines
+    assert any(line.startswith("| here: a check") and "| 0.50 µs |" in line for line in lines)
+    assert any("| 23.4 ms |" in line for line in lines)
+
+
 def test_every_part_has_a_table_and_ratios_come_from_one_run() -> None:
     ipopt = {
         "n": 30,

@@ -6,6 +6,7 @@ from typing import Any
 from guided_lgp.experiments.problems import PROBLEMS
 from guided_lgp.report.cells import NONE, number, percent, search_time, solved_suffix
 from guided_lgp.report.metrics import Metrics
+from guided_lgp.report.peers import peer_tables
 from guided_lgp.report.scalability_tables import label
 from guided_lgp.report.style import NETWORKS
 from guided_lgp.report.table import Table
@@ -39,7 +40,9 @@ def benchmark_page(figures: Metrics) -> str:
         "training": _training,
         "memory": _memory,
     }
-    shown = [build(figures[name]).markdown() for name, build in parts.items() if name in figures]
+    tables = [build(figures[name]) for name, build in parts.items() if name in figures]
+    tables += peer_tables(figures["peers"]) if "peers" in figures else ()
+    shown = [table.markdown() for table in tables]
     about = _machine(figures["machine"]) + _others(figures)
     return "\n".join(["# Benchmarks", "", about, "", *shown])
 
