@@ -108,7 +108,7 @@ class Moments:
         )
 
     def _contacts(self, moment: Moment) -> frozenset[int]:
-        """The actions in whose contacts hands are, or near which."""
+        """The actions in whose contacts hands are, or straight before or after them."""
         return frozenset(
             contact
             for road, (where, row) in zip(self._roads, moment, strict=True)

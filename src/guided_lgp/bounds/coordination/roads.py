@@ -73,11 +73,11 @@ class Edge:
     leaves: frozenset[int]
     """The action whose contact it leaves ..."""
     left: int
-    """... and the first row that is away from it."""
+    """... and the first row off the straight way from there."""
     comes: frozenset[int]
     """The action to whose contact it comes ..."""
     coming: int
-    """... and the last row that is away from that."""
+    """... and the last row before the straight way."""
 
     @property
     def ticks(self) -> int:
@@ -85,7 +85,7 @@ class Edge:
         return len(self.q) - 1
 
     def contacts(self, row: int) -> frozenset[int]:
-        """The actions in whose contacts the hand is, or near which."""
+        """The actions in whose contacts the hand is, or straight before or after it."""
         leaves = self.leaves if row < self.left else frozenset[int]()
         return leaves | self.comes if row > self.coming else leaves
 
@@ -206,7 +206,7 @@ class Road:
                 q = np.pad(q, ((lacking, 0), (0, 0)), mode="edge")
                 free, near = self._between(way, q), away[1] + lacking
                 lead, q, values = self._together(q, free, near, *fingers)
-                yield self._edge(node, end, q, values, (lead + away[0], lead + near), needs)
+                yield self._edge(node, end, q, values, (lead + free[0], lead + free[1]), needs)
                 return
             slower *= _SLOWER
 
