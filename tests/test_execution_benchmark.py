@@ -1,10 +1,14 @@
 """What ``make verify-execution`` counts, and the page of its figures."""
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
+import pytest
+
 from guided_lgp.bounds.execution import Conditions
-from guided_lgp.logic import parse_skeleton
+from guided_lgp.logic import Skeleton, parse_skeleton
+from guided_lgp.scene import Scene
 from guided_lgp.scene.generate import generate
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
@@ -28,12 +32,25 @@ def test_a_random_plan_keeps_all_limits_and_is_carried_out() -> None:
     assert row["clearance_mm"] >= 1
 
 
-def test_friction_holds_a_box_with_another_one_on_it() -> None:
-    """At 480 steps per second such boxes have crept by up to 13 mm."""
-    task = execution.Task(2, wanted=execution.loaded, conditions=(Conditions("friction", 0.6),))
+@pytest.mark.parametrize(
+    ("number", "wanted", "friction"), [(2, execution.loaded, 0.6), (19, execution.single, 1.0)]
+)
+def test_friction_holds_boxes_and_lets_go_of_them(
+    number: int, wanted: Callable[[Scene, Skeleton], bool], friction: float
+) -> None:
+    """At 480 steps per second, loaded ones have crept by up to 13 mm; with a friction of 1.0,
+    finger hulls that reached into a box as they left have thrown it away.
+    """
+    task = execution.Task(number, wanted=wanted, conditions=(Conditions("friction", friction),))
     (row,) = execution.carried_out(task)
     assert row["succeeded"], row["fault"]
     assert row["drift_mm"] < 3
+
+
+def test_a_tower_of_eight_is_built_as_planned() -> None:
+    row = execution.built("e8", 0)
+    assert row["succeeded"], row["fault"]
+    assert row["drift_mm"] < 5
 
 
 def test_plans_that_were_not_found_do_not_count() -> None:
