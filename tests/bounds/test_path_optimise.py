@@ -91,6 +91,22 @@ def test_goes_on_into_a_straight_line_without_a_rest(mover: Mover) -> None:
     assert duration(joined) < duration(come, line)
 
 
+def test_lines_with_turns_are_those_of_each_turn_alone(mover: Mover) -> None:
+    tool, turns = mover.tool("pr2L", AHEAD), (0.0, 0.25, -0.25, 1.5)
+    free = 0
+    for direction in (0.09 * tool.rotation[:, 0], np.array([0.0, 0.0, -0.4])):
+        found = list(mover.lines(around(), tool, direction, turns))
+        for turn, line in zip(turns, found, strict=True):
+            (alone,) = mover.lines(around(), tool, direction, (turn,))
+            if isinstance(line, np.ndarray):
+                free += 1
+                assert np.array_equal(line, np.asarray(alone))
+                assert line[-1, 0] == pytest.approx(tool.redundancy + turn)
+            else:
+                assert line == alone
+    assert 0 < free < 2 * len(turns)
+
+
 def test_other_steps_stay_where_they_are(mover: Mover) -> None:
     come = free_motion(straight(LEFT.home, ASIDE), around())
     go = free_motion(straight(ASIDE, LEFT.home), around())
