@@ -19,6 +19,7 @@ from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.bounds.verify import verify_path
 from guided_lgp.bounds.verify.attachments import switches_of
 from guided_lgp.bounds.verify.joints import rows_outside_limits
+from guided_lgp.clearance import clearance_of
 from guided_lgp.explanation import users_bounds
 from guided_lgp.logic import format_skeleton, parse_skeleton
 from guided_lgp.params import load_planning
@@ -115,6 +116,28 @@ def test_the_hand_comes_with_fingers_that_are_open() -> None:
     report = execute(scene, (), skeleton, motion(bounds.path(skeleton)))
     assert report.success, report.fault
     assert report.drift < 0.002
+
+
+def coordinated(setup: str, number: int, actions: str) -> tuple[Scene, PathResult]:
+    (scene,) = generate(setup, 1, 30_000 + number, f"execution-{number:03d}").scenes
+    bounds = users_bounds(scene, load_planning().bounds, NEVER, (), coordinate=True)
+    return scene, bounds.path(parse_skeleton(actions))
+
+
+@pytest.mark.parametrize(
+    ("number", "actions"),
+    [
+        (42, "(grasp pr2L blue) (place pr2L blue tab2) (grasp pr2R blue) (grasp pr2L green)"),
+        (6, "(grasp pr2R red) (place pr2R red green) (grasp pr2R blue) (place pr2R blue tab2)"),
+    ],
+    ids=["through what the other hand takes", "with fingers that are not yet open"],
+)
+def test_a_hand_does_not_pass_through_the_body_of_a_contact(number: int, actions: str) -> None:
+    """It has to be looked at beyond the straight ways: what verification refuses has no motion."""
+    scene, result = coordinated("a", number, actions)
+    trajectory = motion(result)
+    assert not np.any(np.diff(trajectory.times) - TICK > 1e-9)  # all arms at once
+    assert clearance_of(scene, result.skeleton, trajectory).distance > 0.001
 
 
 def test_the_same_plan_twice(apart: tuple[Scene, PathResult], together: PathResult) -> None:

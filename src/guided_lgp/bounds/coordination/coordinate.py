@@ -4,12 +4,11 @@ import time
 from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
-from itertools import product
 from math import isnan
 
 from guided_lgp.bounds.coordination.itinerary import Itinerary, itinerary
 from guided_lgp.bounds.coordination.moments import Moments
-from guided_lgp.bounds.coordination.roads import NEAR, Road
+from guided_lgp.bounds.coordination.roads import MANNERS, Manner, Road
 from guided_lgp.bounds.coordination.schedule import schedule
 from guided_lgp.bounds.coordination.timetable import Timetable
 from guided_lgp.bounds.deadline import NEVER, Deadline, OutOfTimeError
@@ -71,21 +70,19 @@ class Coordinator:
         plan = itinerary(
             self._start, result.skeleton, result.steps, self._mover.arms, self._in_order
         )
-        for unwinds, near in product((True, False), NEAR):
+        for manner in MANNERS:
             with suppress(OutOfTimeError):
-                motion = self._scheduled(result.skeleton, plan, unwinds, near)
+                motion = self._scheduled(result.skeleton, plan, manner)
                 if motion is not None:
                     elapsed = result.time_s + time.perf_counter() - began
                     return replace(motion, steps=result.steps, time_s=elapsed)
         return result
 
-    def _scheduled(
-        self, skeleton: Skeleton, plan: Itinerary, unwinds: bool, near: float
-    ) -> PathResult | None:
+    def _scheduled(self, skeleton: Skeleton, plan: Itinerary, manner: Manner) -> PathResult | None:
         """A verified motion by the ways of all arms."""
         busy = sum(len(stops) > 1 for stops in plan.stops.values())
         roads = {
-            gripper: Road(self._mover, gripper, stops, busy > 1, unwinds, near)
+            gripper: Road(self._mover, gripper, stops, busy > 1, manner)
             for gripper, stops in plan.stops.items()
         }
         moments = Moments(self._scene, roads, plan)

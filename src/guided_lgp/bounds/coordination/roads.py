@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,10 +29,29 @@ _SLOWER = 1.15
 _OFF = 0.004
 """Distance (m) of either finger from the body between them at which the hand may move; planning
 keeps 3 mm from everything."""
-NEAR = (0.2, 1.0)
+_NEAR, _FAR = 0.2, 1.0
 """How far (m of the arm's motion) from a straight way fingers are as open as it asks for: free ways
 are looked for with such fingers, and come within 3 mm of the body. The second is for plans in which
 they would touch it with the first."""
+
+
+class Manner(NamedTuple):
+    """How an arm moves."""
+
+    unwinds: bool
+    """Whether joints come to a stop by the best of their full turns, or by those that the path
+    bound has found."""
+    opens: float
+    """How far (m of its motion) from a straight way fingers are as open as it asks for."""
+    touches: float
+    """How far (m of its motion) from a straight way the hand may come within 3 mm of the body."""
+
+
+MANNERS = (
+    *(Manner(unwinds, opens, 0.0) for unwinds in (True, False) for opens in (_NEAR, _FAR)),
+    Manner(unwinds=True, opens=_NEAR, touches=_NEAR),
+)
+"""In the order in which they are tried."""
 
 
 class Place(IntEnum):
@@ -99,8 +119,7 @@ class Road:
         gripper: str,
         stops: Sequence[Stop],
         waits: bool,
-        unwinds: bool,
-        near: float = NEAR[0],
+        manner: Manner = MANNERS[0],
     ) -> None:
         """Prepare.
 
@@ -109,15 +128,13 @@ class Road:
             gripper: whose arm it is.
             stops: what it has to do.
             waits: whether there is another arm for which it may have to wait.
-            unwinds: whether joints come to a stop by the best of their full turns, or by those that
-                the path bound has found.
-            near: how far from a straight way fingers are as open as it asks for.
+            manner: how it moves.
         """
-        self._near = near
+        self._manner = manner
         self._arm = mover.arms[gripper].arm
         self._stops = stops
         self._waits = waits
-        self._gaps = _gaps(mover, mover.arms[gripper], stops, unwinds)
+        self._gaps = _gaps(mover, mover.arms[gripper], stops, manner.unwinds)
         self._edges: dict[Node, tuple[Edge, ...]] = {}
         self._remaining: dict[Node, float] = {}
         self.start = Node(0, Place.AT)
@@ -200,13 +217,14 @@ class Road:
         slower = self._stops[end.stop].slower
         for _ in range(_PATIENCE):
             q = self._timed(way, slower)
-            away = self._between(way, q, self._near, end.place == Place.BEFORE)
+            away = self._between(way, q, self._manner.opens, end.place == Place.BEFORE)
             lacking = max(len(fingers[1]) - 1 - (away[1] - away[0]), 0)
             if not lacking or not self.contacts(node):
                 q = np.pad(q, ((lacking, 0), (0, 0)), mode="edge")
                 free, near = self._between(way, q), away[1] + lacking
+                apart = self._between(way, q, self._manner.touches)
                 lead, q, values = self._together(q, free, near, *fingers)
-                yield self._edge(node, end, q, values, (lead + free[0], lead + free[1]), needs)
+                yield self._edge(node, end, q, values, (lead + apart[0], lead + apart[1]), needs)
                 return
             slower *= _SLOWER
 
