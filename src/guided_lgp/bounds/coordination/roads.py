@@ -49,7 +49,7 @@ class Manner(NamedTuple):
 
 MANNERS = (
     *(Manner(unwinds, opens, 0.0) for unwinds in (True, False) for opens in (_NEAR, _FAR)),
-    Manner(unwinds=True, opens=_NEAR, touches=_NEAR),
+    *(Manner(unwinds=True, opens=far, touches=far) for far in (_NEAR, _FAR)),
 )
 """In the order in which they are tried."""
 
