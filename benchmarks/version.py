@@ -229,8 +229,8 @@ class Recorder:
         return getattr(self._solver, name)
 
     def solve(self, program: Any, values: Any, settings: Any, *kept: int) -> Any:
-        """As the solver does."""
-        self.last = program, np.array(values), kept
+        """As the solver does, which may be told to leave the first variables where they are."""
+        self.last = program, np.array(values)
         return self._solver.solve(program, values, settings, *kept)
 
 
@@ -243,12 +243,12 @@ def step(setup: str, number: int, words: list[str], steps: int) -> dict[str, Any
     recorder = Recorder(solver)
     bound = coarse.CoarseBound(place.scene, 1, recorder)
     bound.solve(skeleton, place.bounds.coarse(skeleton[:-1]))
-    program, values, kept = recorder.last
+    program, values = recorder.last
     noise = np.random.default_rng(0).normal(scale=0.1, size=len(program.lower))
     values[: len(noise)] = np.clip(values[: len(noise)] + noise, program.lower, program.upper)
     endless = replace(solvers.Settings(), tolerance=-1.0, steps=steps, patience=steps)
     began = time.process_time()
-    solution = solver.solve(program, values, endless, *kept)
+    solution = solver.solve(program, values, endless)
     seconds = (time.process_time() - began) / solution.steps
     return {"seconds": seconds, "variables": program.variables, "rows": program.rows}
 
