@@ -125,29 +125,26 @@ class Limb:
 
     def _open(self, grasp: Grasp, cells: Array, half: Array) -> Flags:
         """Which cells may hold a grasp for which all ends can be reached."""
+        rows = np.flatnonzero(_held(grasp, cells, half))
+        for back, raised in grasp.ends:
+            rows = rows[self._reached(cells[rows], half, self.hand + back, grasp.height + raised)]
+        found = np.zeros(len(cells), dtype=bool)
+        found[rows] = True
+        return found
+
+    def _reached(self, cells: Array, half: Array, behind: float, height: float) -> Flags:
+        """For which cells the wrist may be so far (m) behind the tips; the box at a height (m)."""
         x, y, heading, pitch, along, up, pan = cells.T
         cp, sp = np.cos(pitch), np.sin(pitch)
-        shift = np.hypot(half[4], half[5]) + _SLACK
-        tip = np.hypot(along, up) + shift
-        extent = grasp.half_length * np.abs(cp) + grasp.half_height * sp
-        slope = np.hypot(grasp.half_length, grasp.half_height)  # of the extent in the pitch
-        held = up * sp - along * cp + shift + half[3] * (tip + slope) >= extent + grasp.palm
-        for back, raised in grasp.ends:
-            behind = self.hand + back
-            flat = along - behind * cp
-            wrist = np.stack(
-                [
-                    x + flat * np.cos(heading),
-                    y + flat * np.sin(heading),
-                    grasp.height + raised + up + behind * sp,
-                ]
-            )
-            moved = half[3] * behind + shift
-            radius = np.hypot(half[0], half[1]) + moved + half[2] * (np.abs(flat) + moved)
-            relative = heading - pan
-            tool = np.stack([cp * np.cos(relative), cp * np.sin(relative), -sp])
-            held &= self.reaches(wrist, radius, tool, half[[2, 3, 6]].sum(), pan, half[6])
-        return np.asarray(held)
+        flat = along - behind * cp
+        wrist = np.stack(
+            [x + flat * np.cos(heading), y + flat * np.sin(heading), height + up + behind * sp]
+        )
+        moved = half[3] * behind + np.hypot(half[4], half[5]) + _SLACK
+        radius = np.hypot(half[0], half[1]) + moved + half[2] * (np.abs(flat) + moved)
+        relative = heading - pan
+        tool = np.stack([cp * np.cos(relative), cp * np.sin(relative), -sp])
+        return self.reaches(wrist, radius, tool, half[[2, 3, 6]].sum(), pan, half[6])
 
     def reaches(
         self, wrist: Array, radius: Array, tool: Array, twist: float, pan: Array, turn: float
@@ -261,6 +258,18 @@ class _Wrists:
     def __post_init__(self) -> None:
         object.__setattr__(self, "planar", np.hypot(self.x, self.z))
         object.__setattr__(self, "distance", np.hypot(self.planar, self.y))
+
+
+def _held(grasp: Grasp, cells: Array, half: Array) -> Flags:
+    """In which cells the palm may be outside of the box."""
+    pitch, along, up = cells.T[3:6]
+    cp, sp = np.cos(pitch), np.sin(pitch)
+    shift = np.hypot(half[4], half[5]) + _SLACK
+    tip = np.hypot(along, up) + shift
+    extent = grasp.half_length * np.abs(cp) + grasp.half_height * sp
+    slope = np.hypot(grasp.half_length, grasp.half_height)  # of the extent in the pitch
+    away = up * sp - along * cp + shift + half[3] * (tip + slope)
+    return np.asarray(away >= extent + grasp.palm)
 
 
 def _typical(grasp: Grasp, cells: Array) -> Array:

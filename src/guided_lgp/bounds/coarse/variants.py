@@ -6,6 +6,7 @@ Below something, a box comes and goes by a low straight way as well as from abov
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -39,10 +40,17 @@ class Variants:
     """The choices that a skeleton leaves."""
 
     def __init__(self, geometry: SceneGeometry, skeleton: Skeleton) -> None:
-        grounds = [geometry.domain.bind(action) for action in skeleton]
-        arms = geometry.scene.robot.description.arms
-        self._sides = [_side_count(geometry, arms.get(ground.parent), ground) for ground in grounds]
-        self._low = list(_way_counts(geometry, grounds))
+        self._geometry = geometry
+        self._grounds = [geometry.domain.bind(action) for action in skeleton]
+
+    @cached_property
+    def _sides(self) -> list[int]:
+        arms = self._geometry.scene.robot.description.arms
+        return [_side_count(self._geometry, arms.get(g.parent), g) for g in self._grounds]
+
+    @cached_property
+    def _low(self) -> list[int]:
+        return list(_way_counts(self._geometry, self._grounds))
 
     def starts(self, least: int) -> int:
         """How many starts try one choice after the other until all have met, or the least number.
@@ -64,6 +72,9 @@ class Variants:
         """
         if number and number % 2 == 0:
             return Variant(_drawn(random(), self._sides), _drawn(random(), self._low))
+        if number == 0:
+            first = (0,) * (len(self._grounds) - len(kept.sides))
+            return Variant(kept.sides + first, kept.low + first)
         turn, new = (number + 1) // 2, self._sides[len(kept.sides) :]
         sides = tuple(turn % count for count in new)
         turn //= max(new, default=1)
