@@ -166,6 +166,8 @@ class Gap:
         then, too: above all of what the hand leaves, which another one may take.
         """
         assert first is not None
+        if not self._possible(transit, detour[[0, -1]]):
+            return None
         beside = _lines(*lines)
         for guess in self._guesses(transit, detour):
             path = optimal_path(self._mover, transit, guess, *beside, inset=_INSET)
@@ -175,6 +177,12 @@ class Gap:
             ):
                 return path
         return None
+
+    def _possible(self, transit: Transit, ends: Array) -> bool:
+        """Whether a path may have these ends (2, n): if not, it is needless to look for one."""
+        low, high = self._arm.arm.limits.T
+        inside = np.all((ends > low + _INSET) & (ends < high - _INSET))
+        return bool(inside) and self._mover.collision(transit.surroundings, ends) is None
 
     def _guesses(self, transit: Transit, detour: Array) -> Iterator[Array]:
         if not transit.keep_level:
