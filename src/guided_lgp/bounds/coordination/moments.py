@@ -1,6 +1,6 @@
 """Whether all arms, each somewhere on its way, are clear of each other and of every body."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from itertools import product
 
 import numpy as np
@@ -14,6 +14,7 @@ from guided_lgp.scene import Scene
 
 _COARSE = 12
 """Every so-many-th moment is looked at first: what collides is found soon."""
+_UNKNOWN, _CLEAR, _HIT = range(3)
 _BESIDE = 4
 """Ticks around a collision that verification has found between moments that are clear."""
 
@@ -41,27 +42,35 @@ class Moments:
             {number: stop.contact for number, stop in enumerate(stops) if stop.acts}
             for stops in plan.stops.values()
         ]
-        self._clear: dict[Moment, bool] = {}
+        self._verdicts: dict[tuple[Edge | Node | int, ...], NDArray[np.int8]] = {}
+        """Of all moments at which the same arms are as far apart on their ways, one after the
+        other."""
         self._scenes: dict[tuple[frozenset[int], frozenset[int]], PlanningScene] = {}
 
     def clear(self, start: Moment, ticks: int) -> bool:
         """Whether all arms go on from a moment for some ticks without a collision."""
-        moments = [tuple(later(at, tick) for at in start) for tick in range(1, ticks + 1)]
-        if not all(self._clear.get(moment, True) for moment in moments):
+        known, place = self._known(start)
+        verdicts = known[place : place + ticks + 1]
+        if np.any(verdicts[1:] == _HIT):
             return False
-        unknown = [tick for tick, moment in enumerate(moments) if moment not in self._clear]
-        first = unknown[::-_COARSE]
-        rest = [tick for tick in unknown if tick not in first]
-        return self._judge(moments, first) and self._judge(moments, rest)
+        unknown = 1 + np.flatnonzero(verdicts[1:] == _UNKNOWN)
+        coarse = np.s_[::-_COARSE]
+        order = np.concatenate([unknown[coarse], np.delete(unknown, coarse)])
+        return self._judge(start, order, verdicts)
 
     def block(self, moment: Moment) -> None:
         """Never come near a moment again: what collides there passes the rows beside it, too."""
+        if all(isinstance(where, Node) for where, _ in moment):
+            return
         near = range(-_BESIDE, _BESIDE + 1)
         beside = [
             [at] if isinstance(at[0], Node) else [later(at, ticks) for ticks in near]
             for at in moment
         ]
-        self._clear |= dict.fromkeys(product(*beside), False)
+        for other in product(*beside):
+            known, place = self._known(other)
+            if 0 <= place < len(known):
+                known[place] = _HIT
 
     def over(self, moment: Moment) -> list[int]:
         """The last stop of every arm that is over."""
@@ -70,21 +79,45 @@ class Moments:
             for road, (where, _) in zip(self._roads, moment, strict=True)
         ]
 
-    def _judge(self, moments: Sequence[Moment], some: Sequence[int]) -> bool:
-        """Whether some of the moments are clear between which no action takes effect."""
-        by_contacts: dict[frozenset[int], list[int]] = {}
-        for tick in some:
-            by_contacts.setdefault(self._contacts(moments[tick]), []).append(tick)
-        done = self._done(moments[0])
-        for contacts, ticks in by_contacts.items():
+    def _known(self, moment: Moment) -> tuple[NDArray[np.int8], int]:
+        """What is known of all moments before and after one, up to which the same arms move on; and
+        its place among them.
+        """
+        moving = [(where, row) for where, row in moment if isinstance(where, Edge)]
+        (edge, place), *_ = moving
+        key = (*(where for where, _ in moment), *(row - place for _, row in moving))
+        if key not in self._verdicts:
+            self._verdicts[key] = np.full(edge.ticks + 1, _UNKNOWN, dtype=np.int8)
+        return self._verdicts[key], place
+
+    def _judge(self, start: Moment, ticks: NDArray[np.intp], verdicts: NDArray[np.int8]) -> bool:
+        """Whether moments some ticks (m,) after one, between which no action takes effect, are all
+        clear; they are looked at up to the first that is not.
+        """
+        done = self._done(start)
+        phases = self._phases(start, ticks)
+        for phase in dict.fromkeys(phases.tolist()):
+            those = ticks[phases == phase]
+            contacts = self._contacts(tuple(later(at, int(those[0])) for at in start))
             self._checker.enter(self._scene(done, contacts))
-            clear = self._checker.free(self._rows(moments[0], np.array(ticks)))
-            self._clear |= zip((moments[tick] for tick in ticks), clear.tolist(), strict=True)
-            if not clear.all():
+            hit = self._checker.collisions(self._rows(start, those))
+            first = next((row for row, _ in hit), len(those))
+            verdicts[those[:first]] = _CLEAR
+            if first < len(those):
+                verdicts[those[first]] = _HIT
                 return False
         return True
 
-    def _rows(self, moment: Moment, ticks: NDArray[np.int_]) -> Array:
+    def _phases(self, start: Moment, ticks: NDArray[np.intp]) -> NDArray[np.intp]:
+        """Equal numbers (m,) some ticks after a moment for the same contacts of hands."""
+        phases = np.zeros_like(ticks)
+        for where, row in start:
+            if isinstance(where, Edge):
+                rows = row + ticks
+                phases = 4 * phases + 2 * (rows < where.left) + (rows > where.coming)
+        return phases
+
+    def _rows(self, moment: Moment, ticks: NDArray[np.intp]) -> Array:
         """All moving joints (m, joints), some ticks (m,) after a moment."""
         rows = np.empty((len(ticks), len(self._robot.moving_joints)))
         arms = self._robot.arms.values()
