@@ -48,6 +48,12 @@ def test_a_grip_that_does_not_hold_is_refused_by_name() -> None:
     assert firmest(SCENE, iter([])) is None
 
 
+def test_the_firmest_is_taken_where_none_holds_firmly(monkeypatch: pytest.MonkeyPatch) -> None:
+    loose = motion(firm=False)
+    monkeypatch.setattr("guided_lgp.bounds.path.firm.MOST", load(loose))
+    assert firmest(SCENE, iter([loose])) is loose
+
+
 def test_the_next_motion_is_taken_where_one_does_not_hold() -> None:
     motions = iter([motion(firm=False), motion(firm=True), motion(firm=False)])
     assert firmest(SCENE, motions) is motion(firm=True)

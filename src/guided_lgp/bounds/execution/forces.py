@@ -17,7 +17,9 @@ from guided_lgp.scene.world import BOX_DENSITY
 FRICTION = 0.6
 """Coefficient of friction that grips are made for: cardboard on rubber."""
 RATIO = 0.5
-"""Share of what the pads can carry that a load may take; at 0.72 boxes turned in the hand."""
+"""Share of what the pads can carry that a load should take."""
+MOST = 0.6
+"""The share that it may take: at 0.62 boxes stayed still in the hand, at 0.72 they turned."""
 LEAST = 40.0
 """N: softer grips are not worth their risk."""
 SQUEEZE = 0.004

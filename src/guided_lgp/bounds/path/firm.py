@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from guided_lgp.bounds.execution.forces import RATIO, Grip, grips_of
+from guided_lgp.bounds.execution.forces import MOST, RATIO, Grip, grips_of
 from guided_lgp.bounds.results import Failure, PathResult
 from guided_lgp.bounds.verify.attachments import switches_of
 from guided_lgp.scene import Scene
@@ -12,7 +12,9 @@ _ROUNDING = 1e-6
 
 
 def firmest(scene: Scene, motions: Iterator[PathResult]) -> PathResult | None:
-    """The first motion whose grips hold; if none does, which grip of the best one does not.
+    """The first motion whose grips hold firmly, or else the firmest that holds.
+
+    If none holds, it says which grip of the best one does not.
 
     Args:
         scene: the initial configuration.
@@ -25,7 +27,9 @@ def firmest(scene: Scene, motions: Iterator[PathResult]) -> PathResult | None:
             return motion
         if best is None or worst.ratio < best[0].ratio:
             best = worst, motion
-    return _refused(scene, *best) if best else None
+    if best is None or best[0].ratio <= MOST:
+        return best and best[1]
+    return _refused(scene, *best)
 
 
 def _worst_grip(scene: Scene, motion: PathResult) -> Grip | None:
@@ -41,7 +45,7 @@ def _refused(scene: Scene, grip: Grip, motion: PathResult) -> PathResult:
     failure = Failure(
         action=_switches(scene, motion).index(grip.start),
         constraint=f"grip {grip.gripper} {grip.box}",
-        violation=grip.ratio - RATIO,
+        violation=grip.ratio - MOST,
         tried="motions of several coarse solutions",
     )
     return PathResult(motion.skeleton, feasible=False, failure=failure)
