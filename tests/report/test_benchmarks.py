@@ -88,7 +88,13 @@ def test_every_part_has_a_table_and_ratios_come_from_one_run() -> None:
                 "coarse_feasible": {"n": 80, "median_ms": 2.0, "floor_ms": 0.5},
             },
             "minutes": {"repro": 12.34, "test": 7.0, "load_before": 0.1},
-            "false_infeasible": {"n": 600, "found": 3, "witnesses": []},
+            "false_infeasible": {
+                "n": 600,
+                "found": 3,
+                "witnesses": [],
+                "feasible": 500,
+                "feasible_found": 490,
+            },
             "coarse_bound": {"4": coarse | {"ipopt": ipopt}},
             "path_bound": {"4": motion | {"physics_success_share": 0.98}},
             "enumeration": {"1": 80.0, "2": 150.0},
@@ -104,7 +110,7 @@ def test_every_part_has_a_table_and_ratios_come_from_one_run() -> None:
     assert "| guided-lgp plan --no-coordinate, K = 3 | 20.0 | 10.0 | 2.0× | 5 |" in lines
     assert "| 12.3 | 7.0 | 0.1 |" in lines
     assert "| feasible coarse verdict | 2.00 ms | 0.50 ms | its compiled code | 25.0% |" in lines
-    assert "| 600 | 3 | 0.5% |" in lines
+    assert "| 600 | 3 | 0.5% | 490 of 500 |" in lines
     assert not any("K = 10" in line for line in lines)
     assert "Verdicts that changed: 9 from infeasible to feasible, 0 from" in page
     row = next(line for line in lines if line.startswith(r"| c.1\*"))
