@@ -78,7 +78,7 @@ def many_plans(count: int) -> Plans:
     """Plan again and again in this process."""
     scene, params = load_scene(ROOT / "examples" / "three_boxes.json"), load_params()
     process = psutil.Process()
-    gc.collect()  # a plan that somebody else's error keeps has a client, too
+    others = _clients()  # a world that somebody else in this process keeps has a client, too
     start, before, solved = time.process_time(), 0, 0
     for number in range(count):
         objective = OBJECTIVES[number % len(OBJECTIVES)]
@@ -86,10 +86,16 @@ def many_plans(count: int) -> Plans:
         solved += plan(other, objective, params=params).solved
         if number < WARM_UP:
             before = process.memory_info().rss
-    world_of.cache_clear()  # the world of the last scene is kept
-    clients = sum(map(pybullet.isConnected, range(CLIENTS)))
+    clients = _clients() - others
     growth = (process.memory_info().rss - before) / 2**20
     return Plans(solved, clients, growth, time.process_time() - start)
+
+
+def _clients() -> int:
+    """How many there are, without the world of the last scene, which is kept."""
+    world_of.cache_clear()
+    gc.collect()
+    return sum(map(pybullet.isConnected, range(CLIENTS)))
 
 
 def many_experiments(count: int, folder: Path) -> Database:
