@@ -7,10 +7,12 @@ the stage. The shards stay until another run does not need them: DVC can be kill
 has ended. A shard whose files are not those that were written is computed again.
 """
 
+import gc
 import json
 import logging
 import os
 from collections.abc import Iterable, Iterator, Set
+from contextlib import contextmanager
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
@@ -102,6 +104,25 @@ def write_shard(task: Task) -> None:
     if os.path.lexists(task.shard):
         logger.warning("%s is damaged and computed again", task.shard)
         remove(task.shard)
+    try:
+        with _everything_kept():
+            _enumerate(task)
+    except InputError:
+        if not _is_whole(task.shard):  # else a worker that was thought lost has been faster
+            raise
+
+
+@contextmanager
+def _everything_kept() -> Iterator[None]:
+    """Do not look for cycles, over and over, in verdicts that all stay to the end."""
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()
+
+
+def _enumerate(task: Task) -> None:
     symbols = task.scene.symbols
     found = enumerate_sequences(
         task.scene.state,
@@ -111,14 +132,10 @@ def write_shard(task: Task) -> None:
         task.limits.max_length,
         task.limits.slack,
     )
-    try:
-        with made_whole(task.shard) as shard:
-            write_table(shard / "verdicts.parquet", verdict_table(task.scene, found))
-            write_table(shard / "shortest.parquet", shortest_table(task.scene, found))
-            write_text(shard / _DIGESTS, _digests(shard))
-    except InputError:
-        if not _is_whole(task.shard):  # else a worker that was thought lost has been faster
-            raise
+    with made_whole(task.shard) as shard:
+        write_table(shard / "verdicts.parquet", verdict_table(task.scene, found))
+        write_table(shard / "shortest.parquet", shortest_table(task.scene, found))
+        write_text(shard / _DIGESTS, _digests(shard))
 
 
 def _is_whole(shard: Path) -> bool:
