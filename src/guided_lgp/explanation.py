@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from guided_lgp.bounds.coordination import Coordinator
+from guided_lgp.bounds.coordination.law import SMOOTH
 from guided_lgp.bounds.deadline import Deadline
 from guided_lgp.bounds.goals import GoalTerms
 from guided_lgp.bounds.results import CoarseResult, Failure, PathResult
@@ -64,7 +65,8 @@ def users_bounds(
     coordinate: bool = False,
     in_order: bool = False,
 ) -> SceneBounds:
-    """Bounds for a user's plan: grips hold firmly, where the scene does not give the grasps.
+    """Bounds for a user's plan: jerk is limited, and grips hold firmly, where the scene does not
+    give the grasps.
 
     Args:
         scene: the initial configuration.
@@ -77,7 +79,7 @@ def users_bounds(
     firm = not any(box.grasps for box in scene.movable)
     goals = GoalTerms.of(objective, scene.symbols.domain)
     shorten = Coordinator(scene, deadline, goals, in_order).shorten if coordinate else None
-    return SceneBounds(scene, params, deadline, objective, firm, shorten)
+    return SceneBounds(scene, params, deadline, objective, firm, shorten, SMOOTH)
 
 
 class ObservedBounds:

@@ -207,7 +207,7 @@ def plan(
         scene,
         goals,
         _limits(params.compare_scalability, scene, goals, prefix, max_nodes),
-        ObservedBounds(scene_bounds, scene_bounds.placed),
+        _observing(scene_bounds),
         followed,
         parts=scene_bounds,
         misplaced=misplaced,
@@ -240,7 +240,7 @@ def _at_rest(
     """The plan of no actions, in which arms may still have to go where goals want them."""
     if not GoalTerms.of(goals, scene.symbols.domain).ends:
         return stay(scene)
-    return SceneBounds(scene, params.bounds, deadline, goals).rest()
+    return users_bounds(scene, params.bounds, deadline, goals).rest()
 
 
 def _only_timed(problem: Problem) -> SearchResult:
@@ -273,7 +273,7 @@ class _Attempts:
         self.last = replace(
             problem,
             scene=scene,
-            bounds=ObservedBounds(bounds, bounds.placed),
+            bounds=_observing(bounds),
             parts=bounds,
             policy=problem.policy if knows else Uniform(),
         )
@@ -285,8 +285,7 @@ class _Attempts:
         self._starts += _observed(last).starts
         more = params.model_copy(update={"coarse_restarts": PATIENCE * params.coarse_restarts})
         bounds = self._bounds_of(last.scene, more)
-        observed = ObservedBounds(bounds, bounds.placed)
-        self.last = replace(last, bounds=observed, parts=bounds, widened=lambda: None)
+        self.last = replace(last, bounds=_observing(bounds), parts=bounds, widened=lambda: None)
         return self.last
 
     def take_up(self) -> bool:
@@ -306,6 +305,10 @@ class _Attempts:
             obstacles=() if found.solved else obstacles,
             finding=None if found.solved else _finding(problem, obstacles),
         )
+
+
+def _observing(bounds: SceneBounds) -> ObservedBounds:
+    return ObservedBounds(bounds, bounds.placed)
 
 
 def _observed(problem: Problem) -> ObservedBounds:

@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from guided_lgp import plan
 from guided_lgp.bounds.checks import box_sizes
-from guided_lgp.bounds.coordination import Coordinator
+from guided_lgp.bounds.coordination import Coordinator, coordinate
 from guided_lgp.bounds.coordination.itinerary import Itinerary, Stop, itinerary
 from guided_lgp.bounds.coordination.law import TICK, jerk_limited, ramp
 from guided_lgp.bounds.coordination.turns import best_turns
@@ -31,6 +32,7 @@ from guided_lgp.scene.world import world_of
 PR2 = load_robot("pr2")
 EXAMPLE = Path(__file__).parents[2] / "examples" / "three_boxes.json"
 APART = "(grasp pr2L red) (place pr2L red tab1) (grasp pr2R green) (place pr2R green tab2)"
+LOADED = "(grasp pr2L green) (place pr2L green red) (grasp pr2L red) (place pr2L red tab2)"
 ON_HELD = "(grasp pr2R green) (grasp pr2L red) (place pr2L red green)"
 
 
@@ -56,6 +58,14 @@ def motion(result: PathResult) -> Trajectory:
     return result.trajectory
 
 
+def outside(scene: Scene, result: PathResult) -> dict[str, int]:
+    trajectory = motion(result)
+    switches = switches_of(scene, result.skeleton, trajectory)
+    assert isinstance(switches, list)
+    q = trajectory.joints(PR2.moving_joints)
+    return rows_outside_limits(scene, result.skeleton, switches, q, trajectory.times)
+
+
 def plan_of(scene: Scene, result: PathResult, in_order: bool = False) -> Itinerary:
     base, fixed = scene.robot.base_pose, scene.robot.fixed_values
     arms = {gripper: PlacedArm(PR2, gripper, base, fixed) for gripper in PR2.grippers}
@@ -72,13 +82,9 @@ def test_both_arms_need_half_the_time(
 
 
 def test_no_row_is_outside_any_limit(apart: tuple[Scene, PathResult], together: PathResult) -> None:
-    scene, trajectory = apart[0], motion(together)
-    switches = switches_of(scene, together.skeleton, trajectory)
-    assert isinstance(switches, list)
-    q = trajectory.joints(PR2.moving_joints)
-    outside = rows_outside_limits(scene, together.skeleton, switches, q, trajectory.times)
-    assert "jerk" in outside
-    assert set(outside.values()) == {0}
+    found = outside(apart[0], together)
+    assert "jerk" in found
+    assert set(found.values()) == {0}
 
 
 def test_arms_move_at_once(together: PathResult) -> None:
@@ -218,3 +224,31 @@ def test_fingers_start_and_stop_gently() -> None:
     assert np.all(steps <= fingers.velocity)
     assert steps[0] < 0.75 * steps.max()
     assert ramp(fingers, 0.2, 0.2).tolist() == [0.2]
+
+
+@pytest.mark.parametrize("actions", [APART, ON_HELD, LOADED])
+def test_a_plan_in_turns_keeps_every_limit(actions: str) -> None:
+    scene = load_scene(EXAMPLE)
+    bounds = users_bounds(scene, load_planning().bounds, NEVER, ())
+    assert set(outside(scene, bounds.path(parse_skeleton(actions))).values()) == {0}
+    assert outside(*sequential(actions))["jerk"] > 0
+
+
+def test_a_plan_without_a_motion_of_all_arms_keeps_every_limit(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(coordinate, "MANNERS", ())
+    scene = load_scene(EXAMPLE)
+    bounds = users_bounds(scene, load_planning().bounds, NEVER, (), coordinate=True)
+    result = bounds.path(parse_skeleton(APART))
+    assert len(result.skeleton) == 4
+    assert set(outside(scene, result).values()) == {0}
+
+
+def test_an_arm_that_a_goal_wants_elsewhere_keeps_every_limit() -> None:
+    scene = load_scene(EXAMPLE)
+    joints = PR2.arms["pr2R"].home + 0.3 * np.array([1.0, 0.0, 1.0, -1.0, 1.0, 0.0, 1.0])
+    result = plan(scene, f"(posture pr2R {' '.join(map(str, joints))})").path
+    assert result is not None
+    assert np.ptp(motion(result).q, axis=0).max() > 0.2
+    assert set(outside(scene, result).values()) == {0}

@@ -9,6 +9,7 @@ from guided_lgp.bounds.coarse.parts import Boxes, Parts
 from guided_lgp.bounds.deadline import NEVER, Deadline
 from guided_lgp.bounds.goals import GoalTerms
 from guided_lgp.bounds.path import PathBound, Shorten, check_motions
+from guided_lgp.bounds.path.assembly import FASTEST, Clock
 from guided_lgp.bounds.results import CoarseResult, PathResult
 from guided_lgp.bounds.vocabulary import check_terms
 from guided_lgp.logic import Objective, Skeleton
@@ -37,12 +38,13 @@ class SceneBounds:
         objective: Objective = (),
         firm: bool = False,
         shorten: Shorten | None = None,
+        clock: Clock = FASTEST,
     ) -> None:
         """Prepare a scene, for plans whose goals may say more than symbols.
 
         ``firm`` ones take, of the motions of several coarse solutions, the first whose grips hold
-        what the hands carry: the paper asks for any motion, of one arm at a time where ``shorten``
-        makes no other of it.
+        what the hands carry: the paper asks for any motion, of one arm at a time, by the time law
+        ``clock``, where ``shorten`` makes no other of it.
         """
         check_terms(scene.symbols.domain)
         check_motions(scene.symbols.domain)
@@ -51,7 +53,8 @@ class SceneBounds:
         self._coarse_bound = CoarseBound(
             scene, params.coarse_restarts, deadline=deadline, goals=self._goals
         )
-        self._path_solutions, self._firm, self._shorten = params.path_solutions, firm, shorten
+        self._path_solutions, self._firm = params.path_solutions, firm
+        self._shorten, self._clock = shorten, clock
         self._deadline = deadline
         self._parts = Parts(scene, _PATIENCE * params.coarse_restarts, self.facts, deadline)
         self._pairs = Pairs(scene, self._coarse_bound.solve, self._parts.solve)
@@ -122,4 +125,5 @@ class SceneBounds:
             self._goals,
             self._firm,
             self._shorten,
+            self._clock,
         )

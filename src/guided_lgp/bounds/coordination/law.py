@@ -9,6 +9,8 @@ to row.
 
 import numpy as np
 
+from guided_lgp.bounds.path.assembly import Clock
+from guided_lgp.bounds.path.motions import Motion
 from guided_lgp.bounds.path.timing import Law, fastest_law
 from guided_lgp.bounds.results import Array
 from guided_lgp.robots import Arm
@@ -26,6 +28,8 @@ _SHARE = 0.99
 """Share of the limits that is used, so that the rounded rows keep them too."""
 _FINGER_SHARE = 0.97
 """Share of their velocity limit at which fingers move."""
+_REST = 2
+"""Ticks between two motions of one arm, so that jerks at their ends do not add up."""
 
 
 def jerk_limited(path: Array, arm: Arm, slower: float = 1.0) -> Array:
@@ -74,6 +78,27 @@ def ramp(fingers: Fingers, start: float, end: float) -> Array:
     values = start + (end - start) * _means(np.clip(shares, 0.0, 1.0)[:, None], _WINDOWS[-1])[:, 0]
     values[-1] = end
     return np.asarray(values)
+
+
+def _follow(motion: Motion, slower: float) -> tuple[Array, Array]:
+    rows = jerk_limited(motion.path, motion.arm, slower)
+    rest = _REST if len(rows) > 1 else 0
+    return _ticks(len(rows) + rest), np.pad(rows, ((rest, 0), (0, 0)), mode="edge")
+
+
+def _ramp(fingers: Fingers, start: Array, value: float) -> tuple[Array, Array]:
+    end = fingers.ratios * value
+    way = float(np.abs(end - start).max(initial=0.0))
+    shares = ramp(fingers, 0.0, way) / (way or 1.0)
+    return _ticks(len(shares)), np.outer(1.0 - shares, start) + np.outer(shares, end)
+
+
+def _ticks(count: int) -> Array:
+    return TICK * np.arange(count, dtype=float)
+
+
+SMOOTH = Clock(_follow, _ramp)
+"""Within limited jerk, too, for one motion after the other."""
 
 
 def _averaged(law: Law, ticks: int, window: int) -> Array:

@@ -1,7 +1,8 @@
 """From the steps of a solution to one trajectory of all moving joints."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,6 +28,31 @@ CAREFUL = 3.0
 """How many times slower an arm moves that carries boxes on a box: at full acceleration they tip."""
 
 
+class Clock(NamedTuple):
+    """When joints are where: times (T,) from 0 (s), and their values (T, n)."""
+
+    follow: Callable[[Motion, float], tuple[Array, Array]]
+    """An arm moves so many times slower than it could."""
+    ramp: Callable[[FingerJoints, Array, float], tuple[Array, Array]]
+    """Fingers go from joint values (n,) to one value."""
+
+
+def _follow(motion: Motion, slower: float) -> tuple[Array, Array]:
+    times, values = motion.timed
+    return slower * times, values
+
+
+def _ramp(joints: FingerJoints, start: Array, value: float) -> tuple[Array, Array]:
+    end = joints.ratios * value
+    duration = float(np.abs(end - start).max(initial=0.0)) / (_FINGER_SHARE * joints.velocity)
+    count = 1 + int(np.ceil(duration / INTERVAL))
+    return np.linspace(0.0, duration, count), np.linspace(start, end, count)
+
+
+FASTEST = Clock(_follow, _ramp)
+"""Within velocities and accelerations."""
+
+
 def stay(scene: Scene) -> PathResult:
     """The plan of no actions: the robot rests where it is for an interval."""
     start = assemble(scene.robot.description, situation_at_start(scene), ())
@@ -35,7 +61,7 @@ def stay(scene: Scene) -> PathResult:
 
 
 def assemble(
-    robot: Robot, start: Situation, steps: Iterable[Step], pace: float = 1.0
+    robot: Robot, start: Situation, steps: Iterable[Step], pace: float = 1.0, clock: Clock = FASTEST
 ) -> Trajectory:
     """Time all motions and join them.
 
@@ -44,6 +70,7 @@ def assemble(
         start: where the robot is before the first step.
         steps: each continues where the one before ended.
         pace: how many times slower arms move than they could.
+        clock: times the steps.
     """
     fingers = [arm.fingers.ratios * start.fingers[g] for g, arm in robot.arms.items()]
     rows = [np.concatenate([start.q, *fingers])[None]]
@@ -55,14 +82,13 @@ def assemble(
         last = rows[-1][-1]
         match step:
             case Motion(arm):
-                clock, values = step.timed
                 stacked = sum(holder == arm.gripper for holder, _ in open_since.values()) > 1
-                clock = (CAREFUL if stacked else pace) * clock
+                moments, values = clock.follow(step, CAREFUL if stacked else pace)
                 columns = arm.slice
             case Fingers(gripper, value):
                 joints = robot.arms[gripper].fingers
                 columns = joints.slice
-                clock, values = _ramp(joints, last[columns], value)
+                moments, values = clock.ramp(joints, last[columns], value)
             case Attach(boxes, gripper):
                 ended = [box for box in boxes if box in open_since]
                 attachments += [Attachment(box, *open_since.pop(box), count - 1) for box in ended]
@@ -71,21 +97,13 @@ def assemble(
             case Release(boxes):
                 attachments += [Attachment(box, *open_since.pop(box), count - 1) for box in boxes]
                 continue
-        block = np.tile(last, (len(clock) - 1, 1))
+        block = np.tile(last, (len(moments) - 1, 1))
         block[:, columns] = values[1:]
         if len(block):
             rows.append(block)
-            times.append(times[-1][-1] + clock[1:])
+            times.append(times[-1][-1] + moments[1:])
             count += len(block)
     attachments += [Attachment(b, gripper, i, count - 1) for b, (gripper, i) in open_since.items()]
     return Trajectory(
         robot.moving_joints, np.concatenate(times), np.concatenate(rows), tuple(attachments)
     )
-
-
-def _ramp(joints: FingerJoints, start: Array, value: float) -> tuple[Array, Array]:
-    """Times and values (T, n) of fingers that go from joint values to one value."""
-    end = joints.ratios * value
-    duration = float(np.abs(end - start).max(initial=0.0)) / (_FINGER_SHARE * joints.velocity)
-    count = 1 + int(np.ceil(duration / INTERVAL))
-    return np.linspace(0.0, duration, count), np.linspace(start, end, count)

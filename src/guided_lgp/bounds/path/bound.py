@@ -9,7 +9,7 @@ from itertools import chain, islice
 from guided_lgp.bounds.coarse import CoarseBound
 from guided_lgp.bounds.deadline import NEVER, Deadline, OutOfTimeError
 from guided_lgp.bounds.goals import NO_TERMS, GoalTerms
-from guided_lgp.bounds.path.assembly import assemble, stay
+from guided_lgp.bounds.path.assembly import FASTEST, Clock, assemble, stay
 from guided_lgp.bounds.path.firm import firmest
 from guided_lgp.bounds.path.grips import grips_of
 from guided_lgp.bounds.path.motions import Mover
@@ -56,6 +56,7 @@ class PathBound:
         goals: GoalTerms = NO_TERMS,
         firm: bool = False,
         shorten: Shorten | None = None,
+        clock: Clock = FASTEST,
     ) -> None:
         """Prepare for one scene.
 
@@ -66,13 +67,14 @@ class PathBound:
             deadline: after which it gives up.
             goals: terms that the motion keeps.
             firm: whether grips have to hold what the hands carry.
-            shorten: what makes a motion of the steps, where it can; else one arm moves at a time.
+            shorten: makes one motion of the steps, where it can; else one arm moves at a time ...
+            clock: ... by this time law.
         """
         self._scene = scene
         self._coarse = coarse
         self._solutions = solutions
         self._goals = goals
-        self._firm, self._shorten = firm, shorten
+        self._firm, self._shorten, self._clock = firm, shorten, clock
         self._mover = Mover(scene, _ITERATIONS, deadline)
         self._grips = {
             (gripper, box.name): grips_of(box, arm)
@@ -178,7 +180,7 @@ class PathBound:
     ) -> PathResult | Violation:
         """The verified motion of some steps one after the other, slower where motors are weak."""
         for pace in _PACES:
-            trajectory = assemble(self._mover.robot, task.start, steps, pace)
+            trajectory = assemble(self._mover.robot, task.start, steps, pace, self._clock)
             report = verify_path(self._world, found.skeleton, trajectory, self._goals)
             if report.violation is None or not report.violation.constraint.startswith("effort "):
                 break
