@@ -22,6 +22,7 @@ typedef struct {
     const float *sine;      /* 9: what the sine of the value adds to the rotation */
     const float *versine;   /* 9: what one minus its cosine adds */
     const float *slide;     /* 3: what the value adds to the position */
+    int loose;              /* joints after these whose poses each configuration says itself */
     int bodies;
     const int *joint;
     const float *frame; /* 12 per body, in its joint: of its oriented box */
@@ -112,18 +113,21 @@ static INLINE void relative(const pose *a, const pose *b, pose *out)
     }
 }
 
-/* Clear near where a box around the origin and an interval along its axes are apart. */
+/* Clear near where a box around the origin and an interval along its axes are apart, or, with a
+ * negative padding, where they overlap by less than that along one axis. */
 static INLINE void separate(lanes low[3], lanes high[3], const float *half, float padding, int *near)
 {
+    int may_overlap = padding < 0;
     for (int l = 0; l < LANES; l++) {
-        float apart = 0;
+        float apart = 0, widest = -1e30f;
         for (int r = 0; r < 3; r++) {
             float above = low[r][l] - half[r], below = -half[r] - high[r][l];
             float gap = above > below ? above : below;
+            widest = gap > widest ? gap : widest;
             gap = gap > 0 ? gap : 0;
             apart += gap * gap;
         }
-        near[l] &= !(apart > padding * padding);
+        near[l] &= may_overlap ? !(widest > padding) : !(apart > padding * padding);
     }
 }
 
@@ -199,10 +203,28 @@ static INLINE int pair_near(const scene *s, const pose *poses, int a, int b, flo
     return any_of(near);
 }
 
+/* A position and a quaternion, x y z w, in one lane. */
+static INLINE void loose_pose(const double *p, int l, pose *out)
+{
+    double x = p[3], y = p[4], z = p[5], w = p[6], s = 2 / (x * x + y * y + z * z + w * w);
+    const float entry[12] = {
+        1 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y),
+        s * (x * y + w * z), 1 - s * (x * x + z * z), s * (y * z - w * x),
+        s * (x * z - w * y), s * (y * z + w * x), 1 - s * (x * x + y * y),
+        p[0], p[1], p[2]};
+    for (int e = 0; e < 12; e++)
+        out->entry[e][l] = entry[e];
+}
+
 /* Where all bodies are in the configurations from the first on; behind the last it stays. */
 static INLINE void place(const scene *s, int first, int count, const float *value, const float *sine,
-                         const float *versine, pose *joints, pose *poses)
+                         const float *versine, const double *loose, pose *joints, pose *poses)
 {
+    for (int k = 0; k < s->loose; k++)
+        for (int l = 0; l < LANES; l++) {
+            int row = first + l < count ? first + l : count - 1;
+            loose_pose(loose + 7 * (row * s->loose + k), l, &joints[s->joints + k]);
+        }
     for (int j = 0; j < s->joints; j++) {
         lanes v, sn, vs;
         for (int l = 0; l < LANES; l++) {
@@ -217,17 +239,19 @@ static INLINE void place(const scene *s, int first, int count, const float *valu
         body_pose(s->frame + 12 * i, s->joint[i] < 0 ? 0 : &joints[s->joint[i]], &poses[i]);
 }
 
-/* Values, sines and one minus cosines (count, joints) to near (count, pairs), which is zero before:
- * 1 unless it is sure that a pair of bodies is farther apart than the padding. */
-WIDEST void certify(const scene *s, int pairs, const int *pair, float padding, int count,
-             const float *value, const float *sine, const float *versine, unsigned char *near)
+/* Values, sines and one minus cosines (count, joints), and poses (count, loose, 7), to near
+ * (count, pairs), which is zero before: 1 unless it is sure that a pair of bodies is farther apart
+ * than its padding. */
+WIDEST void certify(const scene *s, int pairs, const int *pair, const float *padding, int count,
+             const float *value, const float *sine, const float *versine, const double *loose,
+             unsigned char *near)
 {
-    pose joints[s->joints], poses[s->bodies];
+    pose joints[s->joints + s->loose], poses[s->bodies];
     for (int first = 0; first < count; first += LANES) {
-        place(s, first, count, value, sine, versine, joints, poses);
+        place(s, first, count, value, sine, versine, loose, joints, poses);
         for (int p = 0; p < pairs; p++) {
             int unsure[LANES];
-            if (!pair_near(s, poses, pair[2 * p], pair[2 * p + 1], padding, unsure))
+            if (!pair_near(s, poses, pair[2 * p], pair[2 * p + 1], padding[p], unsure))
                 continue;
             for (int l = 0; l < LANES && first + l < count; l++)
                 near[(long)(first + l) * pairs + p] = unsure[l];
@@ -256,11 +280,11 @@ static INLINE void box_gap(const pose *b, const float *half_a, const float *half
 
 /* The same to least (count, pairs): what the distance of a pair of bodies is at least. */
 WIDEST void gaps(const scene *s, int pairs, const int *pair, int count, const float *value,
-          const float *sine, const float *versine, float *least)
+          const float *sine, const float *versine, const double *loose, float *least)
 {
-    pose joints[s->joints], poses[s->bodies];
+    pose joints[s->joints + s->loose], poses[s->bodies];
     for (int first = 0; first < count; first += LANES) {
-        place(s, first, count, value, sine, versine, joints, poses);
+        place(s, first, count, value, sine, versine, loose, joints, poses);
         for (int p = 0; p < pairs; p++) {
             int a = pair[2 * p], b = pair[2 * p + 1];
             pose b_in_a, a_in_b;

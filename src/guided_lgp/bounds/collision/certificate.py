@@ -30,6 +30,7 @@ class _Scene(ctypes.Structure):
     _fields_ = (
         ("joints", ctypes.c_int),
         *((name, ctypes.c_void_p) for name in ("parent", "placement", "sine", "versine", "slide")),
+        ("loose", ctypes.c_int),
         ("bodies", ctypes.c_int),
         *((name, ctypes.c_void_p) for name in ("joint", "frame", "half")),
         *((name, ctypes.c_void_p) for name in ("start", "vertices", "radius")),
@@ -51,7 +52,14 @@ class _Body:
 class Certificate:
     """Says of configurations in one scene which bodies are surely apart."""
 
-    def __init__(self, model: Any, template: Array, geometry: Any, moving: Sequence[str]) -> None:
+    def __init__(
+        self,
+        model: Any,
+        template: Array,
+        geometry: Any,
+        moving: Sequence[str],
+        loose: Sequence[int] = (),
+    ) -> None:
         """Prepare a scene.
 
         Args:
@@ -59,6 +67,7 @@ class Certificate:
             template: (nq,) of the model; the joints that do not move stay there.
             geometry: all bodies, by pinocchio; each hangs on a joint.
             moving: the joints of a configuration.
+            loose: numbers of the bodies that hang on none, but are where each configuration says.
         """
         self._library = _library()
         numbers = [model.getJointId(name) for name in moving]
@@ -79,9 +88,13 @@ class Certificate:
         ]
         pointers = [array.ctypes.data for array in self._arrays]
         own = [self._joint.ctypes.data, self._frame.ctypes.data]
-        self._scene = _Scene(len(moving), *pointers[:5], len(bodies), *own, *pointers[5:])
+        self._scene = _Scene(
+            len(moving), *pointers[:5], len(loose), len(bodies), *own, *pointers[5:]
+        )
         for number, body in enumerate(geometry.geometryObjects):
             self.move(number, body.parentJoint, body.placement.homogeneous)
+        for joint, number in enumerate(loose, len(moving)):
+            self._joint[number], self._frame[number] = joint, flat(self._boxes[number])
 
     def move(self, body: int, joint: int, placement: Array) -> None:
         """Put a body somewhere: pose (4, 4) in the frame of a joint of the model."""
@@ -89,19 +102,27 @@ class Certificate:
         self._joint[body] = carrier
         self._frame[body] = flat(offset @ placement @ self._boxes[body])
 
-    def near(self, values: Array, pairs: NDArray[np.intc], padding: float) -> NDArray[np.bool_]:
+    def near(
+        self,
+        values: Array,
+        pairs: NDArray[np.intc],
+        padding: float | Array,
+        loose: Array | None = None,
+    ) -> NDArray[np.bool_]:
         """Which pairs (m, p) of bodies may be near each other; all of them without a compiler.
 
         Args:
             values: (m, joints) of the moving joints (rad or m).
             pairs: (p, 2) numbers of bodies, contiguous.
-            padding: the distance (m) at which they are near.
+            padding: the distance (m) at which they are near, of all or of each pair (p,); if it is
+                negative, they are only where they are deeper than that in each other.
+            loose: (m, loose bodies, 7) where these are, contiguous, if there are some.
         """
         if self._library is None:
             return np.ones((len(values), len(pairs)), dtype=np.bool_)
         near = np.zeros((len(values), len(pairs)), dtype=np.bool_)
-        apart = ctypes.c_float(padding + _ROUNDING)
-        self._find(self._library.certify, near, values, pairs, apart)
+        apart = np.full(len(pairs), padding + _ROUNDING, dtype=np.float32)
+        self._find(self._library.certify, near, values, pairs, address(apart), loose=loose)
         return near
 
     def gaps(self, values: Array, pairs: NDArray[np.intc]) -> NDArray[np.float32]:
@@ -120,10 +141,11 @@ class Certificate:
         found: NDArray[Any],
         values: Array,
         pairs: NDArray[np.intc],
-        *options: ctypes.c_float,
+        *options: ctypes.c_void_p,
+        loose: Array | None = None,
     ) -> None:
         plain = np.ascontiguousarray(values[:, self._columns], dtype=np.float32)
-        arrays = (plain, np.sin(plain), 1 - np.cos(plain), found)
+        arrays = (plain, np.sin(plain), 1 - np.cos(plain), loose, found)
         given = (ctypes.byref(self._scene), len(pairs), address(pairs), *options)
         function(*given, len(values), *map(address, arrays))
 

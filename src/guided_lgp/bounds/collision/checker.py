@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 
 from guided_lgp.bounds.collision.certificate import Certificate
 from guided_lgp.bounds.collision.nearest import Nearest
-from guided_lgp.bounds.collision.shapes import convex_shape, robot_shapes
+from guided_lgp.bounds.collision.shapes import bodies_of
 from guided_lgp.bounds.results import Array
-from guided_lgp.poses import IDENTITY
 from guided_lgp.robots import Arm
 from guided_lgp.scene import Box, Scene
 
@@ -64,19 +63,8 @@ class CollisionChecker:
 
     def __init__(self, scene: Scene) -> None:
         robot = self._robot = scene.robot.description
-        self._model = pin.buildModelFromUrdf(str(robot.urdf))
-        base = pin.XYZQUATToSE3(scene.robot.base_pose)
-        self._geometry = pin.GeometryModel()
-        self._names: list[str] = []
-        for link, joint, pose, shape in robot_shapes(robot.urdf):
-            self._add(link, joint, pin.SE3(pose) if joint else base * pin.SE3(pose), shape)
-        for joint in range(1, self._model.njoints):
-            if self._model.parents[joint] == 0:
-                self._model.jointPlacements[joint] = base * self._model.jointPlacements[joint]
-        for body in (*scene.in_the_way, *scene.supports):
-            self._add(body.name, 0, pin.XYZQUATToSE3(body.placement), convex_shape(body.convex))
-        for box in scene.movable:
-            self._add(box.name, 0, pin.XYZQUATToSE3(IDENTITY), convex_shape(box.convex))
+        self._model, self._geometry = bodies_of(scene)
+        self._names = [str(body.name) for body in self._geometry.geometryObjects]
         self._bodies: dict[str, list[int]] = {}
         for number, name in enumerate(self._names):
             self._bodies.setdefault(name, []).append(number)
@@ -290,10 +278,6 @@ class CollisionChecker:
         angles = moving[:, self._turning]
         full[:, self._cosine_at], full[:, self._cosine_at + 1] = np.cos(angles), np.sin(angles)
         return full
-
-    def _add(self, name: str, joint: int, placement: Any, shape: Any) -> None:
-        self._geometry.addGeometryObject(pin.GeometryObject(name, joint, placement, shape))
-        self._names.append(name)
 
     def _put(self, name: str, gripper: str | None, placement: Array) -> None:
         """Put a box at a pose (7,), in the world or in a tool frame, unless it is there."""

@@ -13,6 +13,8 @@ import pinocchio as pin
 
 from guided_lgp.bounds.results import Array
 from guided_lgp.cache import made
+from guided_lgp.poses import IDENTITY
+from guided_lgp.scene import Scene
 from guided_lgp.scene.shapes import Convex
 
 _KINDS = {
@@ -70,6 +72,29 @@ def _written(urdf: Path) -> list[tuple[Any, ...]]:
         pose, kind = body.placement.homogeneous.tolist(), type(shape).__name__
         found.append((link, body.parentJoint, pose, kind, shape.saveToString()))
     return found
+
+
+def bodies_of(scene: Scene) -> tuple[Any, Any]:
+    """Pinocchio's model of a scene's robot where it stands, and all bodies by their names.
+
+    First the shapes of the links, then what never moves, then the boxes, which are nowhere yet.
+    """
+    urdf, base = scene.robot.description.urdf, pin.XYZQUATToSE3(scene.robot.base_pose)
+    model, geometry = pin.buildModelFromUrdf(str(urdf)), pin.GeometryModel()
+
+    def add(name: str, joint: int, placement: Any, shape: Any) -> None:
+        geometry.addGeometryObject(pin.GeometryObject(name, joint, placement, shape))
+
+    for link, joint, pose, shape in robot_shapes(urdf):
+        add(link, joint, pin.SE3(pose) if joint else base * pin.SE3(pose), shape)
+    for joint in range(1, model.njoints):
+        if model.parents[joint] == 0:
+            model.jointPlacements[joint] = base * model.jointPlacements[joint]
+    for body in (*scene.in_the_way, *scene.supports):
+        add(body.name, 0, pin.XYZQUATToSE3(body.placement), convex_shape(body.convex))
+    for box in scene.movable:
+        add(box.name, 0, pin.XYZQUATToSE3(IDENTITY), convex_shape(box.convex))
+    return model, geometry
 
 
 def convex_shape(convex: Convex) -> Any:

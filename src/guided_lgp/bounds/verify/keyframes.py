@@ -2,7 +2,9 @@
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache
+from itertools import accumulate, pairwise
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -19,6 +21,7 @@ from guided_lgp.bounds.results import Array, Keyframe
 from guided_lgp.bounds.terms import carried
 from guided_lgp.bounds.terms.balanced import whole_stack
 from guided_lgp.bounds.terms.carried import relative
+from guided_lgp.bounds.verify.certified import certificate_of
 from guided_lgp.bounds.verify.efforts import Load, overloads
 from guided_lgp.bounds.verify.geometry import (
     NOTHING,
@@ -52,47 +55,47 @@ def verify_keyframe(
     Returns:
         What is violated; nothing if the keyframe is good.
     """
-    (reached,) = _reached(world.scene, [keyframe])
     after = state if action is None else successor(state, action)
-    return _faults(world, reached, state, after)
+    (reached,) = _reached(world.scene, [keyframe], [(state, after)])
+    (clear,) = certificate_of(world.scene).clear([reached])
+    return _faults(world, reached, clear)
 
 
 def _faults(
-    world: World,
-    reached: "_Reached",
-    state: State,
-    after: State,
-    good: Mapping[str, Stack] = NOTHING,
+    world: World, reached: "_Reached", clear: bool, good: Mapping[str, Stack] = NOTHING
 ) -> list[Violation]:
-    """What is violated in a keyframe, at a switch from one state to another, or else in one state.
+    """What is violated in a keyframe, of which it may be certain that nothing collides.
 
     Some stacks have been found good before.
     """
     if not reached.is_finite:
         return [Violation("finite pose", math.nan)]
-    held = tuple(dict.fromkeys((*state.held, *after.held)))
-    support = dict(state.support) | dict(after.support)
-    convex, robot = box_bodies(world.scene), world.scene.robot.description
-    given, fingers = given_grasps(world.scene), dict[str, float]()
-    boxes, violations = reached.boxes, joint_limit_faults(robot, reached.keyframe.q)
+    convex, robot, given = (
+        box_bodies(world.scene),
+        world.scene.robot.description,
+        given_grasps(world.scene),
+    )
+    boxes, held, support = reached.boxes, reached.held, reached.support
+    violations = joint_limit_faults(robot, reached.keyframe.q)
     for box, gripper in held:
         arm, tool = robot.arms[gripper], reached.tools[gripper]
-        width = convex[box].size[closing_axis(boxes[box], tool)]
-        keeps = (box, gripper) in state.held and (box, gripper) in after.held
-        fingers[gripper] = _finger_value(arm.fingers, width, keeps)
         violations += grasp_faults(arm, box, convex[box], boxes[box], tool, given.get(box))
     reached.stacks = stacks(boxes, support)
     changed = [box for box, stack in reached.stacks.items() if good.get(box) != stack]
     violations += placement_faults(world.scene, boxes, support, changed)
     violations += _effort_faults(world.scene, reached, held, support)
-    world.set(reached.keyframe.q, reached.boxes, fingers)
-    bodies = body_names(world.scene)
-    violations += [
+    return violations if clear else violations + _collisions(world, reached)
+
+
+def _collisions(world: World, reached: "_Reached") -> list[Violation]:
+    """What PyBullet finds in something else in a keyframe, deepest first."""
+    robot, bodies = world.scene.robot.description, body_names(world.scene)
+    world.set(reached.keyframe.q, reached.boxes, reached.fingers)
+    return [
         Violation(overlap_name(overlap.first, overlap.second, bodies), overlap.depth)
-        for overlap in world.penetrations(touching=support.items())
-        if not declared(overlap, robot, held, support)
+        for overlap in world.penetrations(touching=reached.support.items())
+        if not declared(overlap, robot, reached.held, reached.support)
     ]
-    return violations
 
 
 def verify_keyframes(
@@ -117,29 +120,30 @@ def verify_keyframes(
     Returns:
         The first violation with its action, or None.
     """
-    state = progress(world.scene.state, skeleton[:verified])
-    last = _last_before(world.scene, after_action[:verified])
-    pairs = zip(at_switch[verified:], after_action[verified:], strict=True)
-    frames = iter(_reached(world.scene, [frame for pair in pairs for frame in pair]))
-    for index, action in enumerate(skeleton[verified:], verified):
-        after = successor(state, action)
-        for modes in (state, after):
-            reached = next(frames)
-            found = _faults(world, reached, modes, after, last.stacks)
-            found = found or _slips(last, reached, modes)
-            if found:
-                return Violation(found[0].constraint, found[0].amount, index)
-            last = reached
-        state, _REACHED[last.keyframe] = after, last
+    before = progress(world.scene.state, skeleton[:verified])
+    states = list(accumulate(skeleton[verified:], successor, initial=before))
+    frames = [f for pair in zip(at_switch, after_action, strict=True) for f in pair][2 * verified :]
+    modes = [(state, after) for before, after in pairwise(states) for state in (before, after)]
+    reached = _reached(world.scene, frames, modes)
+    clear = certificate_of(world.scene).clear(reached)
+    last = _last_before(world.scene, after_action[:verified], states[0])
+    for number, (now, is_clear) in enumerate(zip(reached, clear, strict=True)):
+        found = _faults(world, now, is_clear, last.stacks) or _slips(last, now)
+        if found:
+            return replace(found[0], action=verified + number // 2)
+        last = now
+        if number % 2:
+            _REACHED[now.keyframe] = now
     return None
 
 
-def _last_before(scene: Scene, after_action: Sequence[Keyframe]) -> "_Reached":
+def _last_before(scene: Scene, after_action: Sequence[Keyframe], state: State) -> "_Reached":
     """The last keyframe that was checked before, or else the start."""
-    if not after_action:
-        start = Keyframe(at_side(scene), poses_at_side(scene))
-        return _reached(scene, [start])[0]
-    return _REACHED.get(after_action[-1]) or _reached(scene, after_action[-1:])[0]
+    if after_action:
+        last = after_action[-1]
+        return _REACHED.get(last) or _reached(scene, [last], [(state, state)])[0]
+    start = Keyframe(at_side(scene), poses_at_side(scene))
+    return _reached(scene, [start], [(state, state)])[0]
 
 
 @lru_cache(maxsize=1024)
@@ -182,27 +186,47 @@ def _effort_faults(
 
 
 class _Reached:
-    """A keyframe, and where boxes and tools are then, in plain numbers."""
+    """A keyframe at a switch from one state to another, or in one, in plain numbers."""
 
-    def __init__(self, keyframe: Keyframe, tools: dict[str, list[float]]) -> None:
-        self.keyframe, self.tools = keyframe, tools
+    def __init__(
+        self,
+        scene: Scene,
+        keyframe: Keyframe,
+        tools: dict[str, list[float]],
+        state: State,
+        after: State,
+    ) -> None:
+        self.keyframe, self.tools, self.state = keyframe, tools, state
         self.boxes = {name: placement.tolist() for name, placement in keyframe.boxes.items()}
         self.is_finite = math.isfinite(sum(map(sum, self.boxes.values())))
+        self.held = tuple(dict.fromkeys((*state.held, *after.held)))
+        self.support = dict(state.support) | dict(after.support)
         self.stacks = NOTHING
         """Those that have been looked at."""
+        robot, bodies = scene.robot.description, box_bodies(scene)
+        self.fingers: dict[str, float] = {}
+        """Of the hands at boxes: on them, or open around them."""
+        for box, gripper in self.held:
+            width = bodies[box].size[closing_axis(self.boxes[box], tools[gripper])]
+            keeps = (box, gripper) in state.held and (box, gripper) in after.held
+            self.fingers[gripper] = _finger_value(robot.arms[gripper].fingers, width, keeps)
 
     def carrier(self, name: str) -> list[float] | None:
         """The pose of a tool or box; of what never moves, none."""
         return self.tools.get(name) or self.boxes.get(name)
 
 
-def _reached(scene: Scene, keyframes: Sequence[Keyframe]) -> list[_Reached]:
+def _reached(
+    scene: Scene, keyframes: Sequence[Keyframe], modes: Sequence[tuple[State, State]]
+) -> list[_Reached]:
     """Of all keyframes at once, where the tools are."""
     poses = scene.robot.tool_poses(np.array([keyframe.q for keyframe in keyframes]))
     tools = {gripper: rows.tolist() for gripper, rows in poses.items()}
     return [
-        _Reached(keyframe, {gripper: rows[number] for gripper, rows in tools.items()})
-        for number, keyframe in enumerate(keyframes)
+        _Reached(
+            scene, keyframe, {gripper: rows[number] for gripper, rows in tools.items()}, *states
+        )
+        for number, (keyframe, states) in enumerate(zip(keyframes, modes, strict=True))
     ]
 
 
@@ -210,10 +234,10 @@ _REACHED: WeakKeyDictionary[Keyframe, _Reached] = WeakKeyDictionary()
 """What has been found good after an action and may be gone on from."""
 
 
-def _slips(last: _Reached, reached: _Reached, state: State) -> list[Violation]:
+def _slips(last: _Reached, reached: _Reached) -> list[Violation]:
     """Boxes that moved relative to what holds or supports them in this mode."""
     found = []
-    for box, carrier in (*state.held, *state.support):
+    for box, carrier in (*reached.state.held, *reached.state.support):
         before = last.boxes[box], last.carrier(carrier)
         now = reached.boxes[box], reached.carrier(carrier)
         amount = 0.0 if before == now else carried.check(relative(*before), relative(*now))

@@ -1,0 +1,128 @@
+"""Keyframes in which surely nothing is deeper in something else than it may.
+
+What is not certified is for PyBullet to judge, so a verdict is the same with this and without.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
+from itertools import combinations
+from typing import Protocol
+
+import numpy as np
+
+from guided_lgp.bounds.collision.certificate import Certificate
+from guided_lgp.bounds.collision.shapes import bodies_of
+from guided_lgp.bounds.results import Keyframe
+from guided_lgp.bounds.verify.geometry import HAND_DEPTH
+from guided_lgp.robots import Robot
+from guided_lgp.robots.hand_parts import parts_of
+from guided_lgp.scene import Scene
+from guided_lgp.scene.tolerances import MARGIN
+
+_SLACK = 0.004
+"""How much less deep (m) than they may be certified bodies are: PyBullet makes its hulls 1 mm wider
+and measures depths too great, if anything."""
+
+_Pair = tuple[str, str]
+
+
+class Moment(Protocol):
+    """Where all is at once, and what may touch."""
+
+    @property
+    def keyframe(self) -> Keyframe:
+        """Arms and boxes."""
+
+    @property
+    def fingers(self) -> Mapping[str, float]:
+        """Values of the fingers by gripper; open where not given."""
+
+    @property
+    def held(self) -> Sequence[_Pair]:
+        """Boxes and grippers whose hands may touch them."""
+
+    @property
+    def support(self) -> Mapping[str, str]:
+        """What boxes stand on."""
+
+
+class KeyframeCertificate:
+    """Says of moments in one scene in which of them all is surely apart."""
+
+    def __init__(self, scene: Scene) -> None:
+        robot = scene.robot.description
+        model, geometry = bodies_of(scene)
+        names = [str(body.name) for body in geometry.geometryObjects]
+        self._boxes = [box.name for box in scene.movable]
+        loose = range(len(names) - len(self._boxes), len(names))
+        (template,) = robot.kinematics.rows(robot.home[None], scene.robot.fixed_values)
+        self._certificate = Certificate(model, template, geometry, robot.moving_joints, loose)
+        self._fingers = [
+            (gripper, arm.fingers.opened, arm.fingers.ratios.tolist())
+            for gripper, arm in robot.arms.items()
+        ]
+        self._hands = {gripper: _firm_parts(robot, gripper) for gripper in robot.grippers}
+        firm = {link for links in self._hands.values() for link in links}
+        pairs = list(_pairs(robot, names, self._boxes))
+        deep = [pair for pair in pairs if names[pair[0]] in firm and names[pair[1]] in self._boxes]
+        self._pairs = np.array(pairs + deep, dtype=np.intc)
+        self._names: list[_Pair | None] = [(names[one], names[other]) for one, other in pairs]
+        self._names += [None] * len(deep)
+        self._padding = np.full(len(self._pairs), _SLACK - MARGIN)
+        self._padding[len(pairs) :] = _SLACK - HAND_DEPTH
+
+    def clear(self, moments: Sequence[Moment]) -> list[bool]:
+        """In which moments nothing is deeper in something else than it may."""
+        values = np.array([self._moving(moment) for moment in moments])
+        places = np.concatenate(
+            [moment.keyframe.boxes[box] for moment in moments for box in self._boxes]
+        )
+        near = self._certificate.near(values, self._pairs, self._padding, places)
+        found: list[set[_Pair | None]] = [set() for _ in moments]
+        for row, pair in zip(*(where.tolist() for where in near.nonzero()), strict=True):
+            found[row].add(self._names[pair])
+        return [
+            finite and pairs <= self._touching(moment)
+            for pairs, moment, finite in zip(
+                found, moments, np.isfinite(values.sum(axis=1)).tolist(), strict=True
+            )
+        ]
+
+    def _moving(self, moment: Moment) -> list[float]:
+        """Values (m,) of all moving joints."""
+        values: list[float] = moment.keyframe.q.tolist()
+        for gripper, opened, ratios in self._fingers:
+            value = moment.fingers.get(gripper, opened)
+            values += [ratio * value for ratio in ratios]
+        return values
+
+    def _touching(self, moment: Moment) -> set[_Pair | None]:
+        """Pairs that may be in each other; of hands, where they are not too deep: see ``None``."""
+        items = moment.support.items()
+        touching: set[_Pair | None] = {*items, *((below, box) for box, below in items)}
+        touching.update((link, box) for box, hand in moment.held for link in self._hands[hand])
+        return touching
+
+
+def _firm_parts(robot: Robot, gripper: str) -> tuple[str, ...]:
+    """The links of a hand that may be deeper in what it holds than its pads."""
+    pads = parts_of(robot, gripper).pads
+    return tuple(link for link in robot.arms[gripper].hand_links if link not in pads)
+
+
+def _pairs(robot: Robot, names: Sequence[str], boxes: Sequence[str]) -> Iterator[tuple[int, int]]:
+    """Numbers of the bodies that PyBullet looks at, as :class:`World` has it: links come first."""
+    parents, disabled = robot.description.parents, robot.disabled_pairs
+    links = {link for arm in robot.arms.values() for link in (*arm.links, *arm.hand_links)}
+    moving = {*links, *boxes}
+    for first, second in combinations(range(len(names)), 2):
+        one, other = names[first], names[second]
+        related = one == other or parents.get(one) == other or parents.get(other) == one
+        if {one, other} & moving and not related and frozenset((one, other)) not in disabled:
+            yield first, second
+
+
+@lru_cache(maxsize=8)
+def certificate_of(scene: Scene) -> KeyframeCertificate:
+    """The certificate of a scene; it takes some milliseconds to make."""
+    return KeyframeCertificate(scene)
