@@ -20,8 +20,11 @@ from numpy.typing import NDArray
 
 from guided_lgp.cache import is_whole, made, private_folder
 
-_FLAGS = ("-O2", "-fPIC", "-shared", "-fno-math-errno", "-ffp-contract=off")
-"""Optimised, but not so that a sum depends on the machine."""
+_FLAGS = (
+    *("-O2", "-fPIC", "-shared", "-fno-semantic-interposition"),
+    *("-fno-math-errno", "-ffp-contract=off"),
+)
+"""Optimised, calls within a library too, but not so that a sum depends on the machine."""
 _PRELUDE = """\
 #include <stdlib.h>
 #if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__)

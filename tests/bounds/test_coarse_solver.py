@@ -49,6 +49,21 @@ def _assert_jacobian(kernel: Kernel, rng: np.random.Generator) -> None:
         assert transposed[j] == pytest.approx(expected, abs=1e-5), kernel.name
 
 
+@pytest.mark.parametrize("robot", robot_names())
+def test_what_instances_share_gives_the_same_bytes(robot: str) -> None:
+    rng, found = np.random.default_rng(1), 0
+    for kernel in kernel_table(kinematics_of(load_robot(robot))):
+        for _ in range(20 if kernel.shared else 0):
+            x, p = rng.uniform(-2, 2, kernel.inputs), rng.uniform(-1, 1, kernel.parameters)
+            others = x.copy(), p.copy()
+            others[0][kernel.shared.inputs :] = np.nan
+            others[1][kernel.shared.parameters :] = np.nan
+            apart = kernel.shared.rows(x, p, kernel.shared.values(*others))
+            assert np.array(apart).tobytes() == np.array(kernel.residual(x, p)).tobytes()
+            found += 1
+    assert found
+
+
 def test_rows_change_by_no_more_than_their_levers_say() -> None:
     scene = generate("a", 1, 11, "x").scenes[0]
     skeleton = parse_skeleton("(grasp pr2L red) (place pr2L red green) (grasp pr2R green)")

@@ -17,7 +17,7 @@ import casadi as ca
 import numpy as np
 
 from guided_lgp.bounds.program.inverse import INPUTS, closed_forms
-from guided_lgp.bounds.program.kernels import KernelShape, KernelTable
+from guided_lgp.bounds.program.kernels import Kernel, KernelShape, KernelTable
 from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.bounds.terms import kernel_table
 from guided_lgp.cache import made
@@ -25,7 +25,16 @@ from guided_lgp.compiled import load_generated
 from guided_lgp.robots import Robot
 
 _HERE = Path(__file__).parent
-_LOOP = (_HERE / "cholesky.c", _HERE / "solver.c")
+_LOOP = tuple(_HERE / f"{name}.c" for name in ("rows", "cholesky", "solver", "closed_forms"))
+
+_EXTREMES = """
+#include <math.h>
+static inline double smaller(double a, double b) { return a < b ? a : b; }
+static inline double larger(double a, double b) { return a > b ? a : b; }
+#define fmin smaller
+#define fmax larger
+"""
+"""Without calls, and without a case for what is not a number: nothing is asked for as often."""
 
 
 def load_library(robot: Robot) -> ctypes.CDLL | None:
@@ -79,21 +88,28 @@ def _source(robot: Robot) -> str:
     kinematics = kinematics_of(robot)
     table, forms = kernel_table(kinematics), closed_forms(kinematics)
     generator = ca.CodeGenerator("kernels", {"casadi_int": "int", "with_header": False})
-    functions = [f for kernel in table for f in (kernel.residual, kernel.jacobian)]
+    functions = [f for kernel in table for f in kernel.compiled]
     for function in (*functions, *forms.values()):
         generator.add(function)
-    entries = ", ".join(
-        f"{{{k.name}_residual, {k.name}_jacobian, {k.inputs}, {k.rows}, {int(k.equality)}}}"
-        for k in table
-    )
+    entries = ", ".join(map(_entry, table))
     macros = {
         "KERNELS": entries,
         "FORMS": ", ".join(form.name() for form in forms.values()) or "0",
         "FORM_INPUTS": INPUTS,
         "LARGEST_INPUT": max(kernel.inputs for kernel in table),
         "LARGEST_ROWS": max(kernel.rows for kernel in table),
+        "LARGEST_SHARED": max(1, *(k.shared.values.numel_out() for k in table if k.shared)),
         "WORK": max(1, *(function.sz_w() for function in (*functions, *forms.values()))),
     }
     loop = "\n".join(part.read_text(encoding="utf-8") for part in _LOOP)
     defines = "\n".join(f"#define {name} {value}" for name, value in macros.items())
-    return f"{generator.dump()}\n{defines}\n{loop}"
+    return f"{_EXTREMES}{generator.dump()}\n{defines}\n{loop}"
+
+
+def _entry(kernel: Kernel) -> str:
+    """A kernel as the structure in rows.c."""
+    shared = kernel.shared
+    functions = [function.name() for function in kernel.compiled] + ["0"] * (shared is None)
+    sizes = (shared.inputs, shared.parameters) if shared else (0, 0)
+    numbers = (kernel.inputs, kernel.rows, int(kernel.equality), *sizes)
+    return f"{{{', '.join((*functions, *map(str, numbers)))}}}"

@@ -33,6 +33,23 @@ class KernelShape:
 
 
 @dataclass(frozen=True)
+class Shared:
+    """What of a residual depends on its first arguments and parameters alone.
+
+    Instances that have those in common share it, as the obstacles of one configuration of an arm
+    share where the arm is. Evaluated apart, it gives the same numbers as within the residual.
+    """
+
+    inputs: int
+    """How many arguments, the first ones."""
+    parameters: int
+    values: Any
+    """CasADi function of (x, p) to the values."""
+    rows: Any
+    """CasADi function of (x, p, values) to c (rows,)."""
+
+
+@dataclass(frozen=True)
 class Kernel(KernelShape):
     """One kind of constraint.
 
@@ -44,6 +61,14 @@ class Kernel(KernelShape):
     jacobian: Any
     independent: Any
     """Like ``residual``, with no more rows than independent constraints, for other solvers."""
+    shared: Shared | None = None
+
+    @property
+    def compiled(self) -> tuple[Any, ...]:
+        """What the solver in C calls: for the rows, their Jacobian, and what they share."""
+        if self.shared is None:
+            return self.residual, self.jacobian
+        return self.shared.rows, self.jacobian, self.shared.values
 
 
 def kernel(
@@ -54,6 +79,7 @@ def kernel(
     equality: bool = False,
     lengths: int | None = None,
     independent: Any = None,
+    shared: Shared | None = None,
 ) -> Kernel:
     """The kernel of a symbolic residual.
 
@@ -65,6 +91,7 @@ def kernel(
         equality: whether the rows vanish; otherwise none is negative.
         lengths: how many rows, the first ones, are lengths; all by default.
         independent: of the rows, an equivalent without dependent ones.
+        shared: by instances with the same first arguments and parameters.
     """
     jacobian = ca.densify(ca.jacobian(c, x))
     return Kernel(
@@ -80,6 +107,7 @@ def kernel(
         independent=ca.Function(
             f"{name}_independent", [x, p], [c if independent is None else independent]
         ),
+        shared=shared,
     )
 
 

@@ -2,32 +2,51 @@
 
 from array import array
 from collections.abc import Iterable
+from functools import partial
 from math import hypot
+from typing import Any
 
 import casadi as ca
 
 from guided_lgp.bounds.program.arrays import Instance, Instances
 from guided_lgp.bounds.program.context import Context
-from guided_lgp.bounds.program.kernels import SCALE, Kernel, distance, in_frame, kernel
+from guided_lgp.bounds.program.kernels import SCALE, Kernel, Shared, distance, in_frame, kernel
 from guided_lgp.bounds.program.kinematics import Chain, RobotKinematics, levers
 from guided_lgp.bounds.terms.term import Term
 
 
 def _kernel(chain: Chain, fixed: int) -> Kernel:
-    n = len(chain.moving)
+    n, name = len(chain.moving), f"clear_{chain.name}"
     x, p = ca.SX.sym("x", n + 4), ca.SX.sym("p", 7 + fixed)
-    q, pose, z = x[:n], x[n : n + 3], x[n + 3]
-    side, scene = p[0], p[1 : 1 + fixed]
-    closed, z_offset = p[1 + fixed], p[2 + fixed]
-    half, margin = p[3 + fixed : 6 + fixed], p[6 + fixed]
-    arm = chain.pose(q, side, scene, closed)
-    rows = []
+    side, scene, closed = p[0], p[1 : 1 + fixed], p[1 + fixed]
+    centres = ca.densify(chain.pose(x[:n], side, scene, closed).spheres)
+    symbols = ca.SX.sym("centres", *centres.shape)
+    rows = partial(_rows, chain, x[n:], p[2 + fixed :])
+    shared = Shared(
+        inputs=n,
+        parameters=2 + fixed,
+        values=ca.Function(f"{name}_centres", [x, p], [centres]),
+        rows=ca.Function(f"{name}_rows", [x, p, symbols], [rows(symbols)]),
+    )
+    return kernel(name, x, p, rows(centres), shared=shared)
+
+
+def _rows(chain: Chain, pose: Any, p: Any, centres: Any) -> Any:
+    """How far the spheres are from a body, beyond the margin (scaled).
+
+    Args:
+        chain: with the spheres.
+        pose: x, y, yaw and z of the body.
+        p: offset of z, half the body's size (3,), and the margin (m).
+        centres: (3, spheres) m.
+    """
+    half, margin, rows = p[1:4], p[4], []
     for i, sphere in enumerate(chain.spheres):
-        d = arm.spheres[:, i] - ca.vertcat(pose[0], pose[1], z + z_offset)
+        d = centres[:, i] - ca.vertcat(pose[0], pose[1], pose[3] + p[0])
         outside = ca.fabs(ca.vertcat(*in_frame(pose[2], d), d[2])) - half
         inside = ca.fmin(ca.fmax(ca.fmax(outside[0], outside[1]), outside[2]), 0)
         rows.append(SCALE * (distance(ca.fmax(outside, 0)) + inside - sphere.radius - margin))
-    return kernel(f"clear_{chain.name}", x, p, ca.vertcat(*rows))
+    return ca.vertcat(*rows)
 
 
 def _kernels(robot: RobotKinematics) -> tuple[Kernel, ...]:
