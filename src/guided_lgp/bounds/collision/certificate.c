@@ -7,6 +7,7 @@
 #include <math.h>
 
 #define LANES 16 /* configurations at once */
+#define STEPS 16 /* directions in which two bodies are looked at last */
 
 typedef float lanes[LANES];
 
@@ -239,22 +240,98 @@ static INLINE void place(const scene *s, int first, int count, const float *valu
         body_pose(s->frame + 12 * i, s->joint[i] < 0 ? 0 : &joints[s->joint[i]], &poses[i]);
 }
 
-/* Values, sines and one minus cosines (count, joints), and poses (count, loose, 7), to near
- * (count, pairs), which is zero before: 1 unless it is sure that a pair of bodies is farther apart
- * than its padding. */
+/* Values, sines and one minus cosines (count, joints) to near (count, pairs), which is zero before:
+ * 1 unless it is sure that a pair of bodies is farther apart than its padding. */
 WIDEST void certify(const scene *s, int pairs, const int *pair, const float *padding, int count,
-             const float *value, const float *sine, const float *versine, const double *loose,
-             unsigned char *near)
+             const float *value, const float *sine, const float *versine, unsigned char *near)
 {
-    pose joints[s->joints + s->loose], poses[s->bodies];
+    pose joints[s->joints], poses[s->bodies];
     for (int first = 0; first < count; first += LANES) {
-        place(s, first, count, value, sine, versine, loose, joints, poses);
+        place(s, first, count, value, sine, versine, 0, joints, poses);
         for (int p = 0; p < pairs; p++) {
             int unsure[LANES];
             if (!pair_near(s, poses, pair[2 * p], pair[2 * p + 1], padding[p], unsure))
                 continue;
             for (int l = 0; l < LANES && first + l < count; l++)
                 near[(long)(first + l) * pairs + p] = unsure[l];
+        }
+    }
+}
+
+static INLINE float dot(const float *a, const float *b)
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* The vertex of a body that lies farthest along a direction in its frame. */
+static const float *farthest(const scene *s, int body, const float *direction)
+{
+    const float *found = s->vertices + 3 * s->start[body], *end = s->vertices + 3 * s->start[body + 1];
+    float most = dot(found, direction);
+    for (const float *v = found + 3; v < end; v += 3) {
+        float along = dot(v, direction);
+        if (along > most)
+            most = along, found = v;
+    }
+    return found;
+}
+
+/* Whether along some direction the vertices of two bodies are farther apart than the padding.
+ * The directions go to the point of their difference that is nearest to its origin: each step to
+ * the nearest one on the way to what lies farthest against the last direction. */
+static int split(const scene *s, const pose *poses, int a, int b, int lane, float padding)
+{
+    pose relation;
+    relative(&poses[a], &poses[b], &relation);
+    float turn[9], shift[3];
+    for (int e = 0; e < 9; e++)
+        turn[e] = relation.entry[e][lane];
+    for (int r = 0; r < 3; r++)
+        shift[r] = relation.entry[9 + r][lane];
+    float to[3] = {shift[0], shift[1], shift[2]};
+    for (int step = 0; step < STEPS; step++) {
+        float back[3];
+        for (int c = 0; c < 3; c++)
+            back[c] = -(turn[c] * to[0] + turn[3 + c] * to[1] + turn[6 + c] * to[2]);
+        const float *of_a = farthest(s, a, to), *of_b = farthest(s, b, back);
+        float between[3], way[3];
+        for (int r = 0; r < 3; r++)
+            between[r] = dot(turn + 3 * r, of_b) + shift[r] - of_a[r];
+        if (dot(between, to) > padding * sqrtf(dot(to, to)))
+            return 1;
+        for (int r = 0; r < 3; r++)
+            way[r] = between[r] - to[r];
+        float part = step ? -dot(to, way) / dot(way, way) : 1;
+        part = part < 1 ? part : 1;
+        if (!(part > 0))
+            return 0;
+        for (int r = 0; r < 3; r++)
+            to[r] += part * way[r];
+    }
+    return 0;
+}
+
+/* Configurations as above, poses (count, loose, 7), and which pairs (count, pairs) of each are not looked at, to
+ * sure (count): whether all others are farther apart than their paddings. */
+WIDEST void settle(const scene *s, int pairs, const int *pair, const float *padding, int count,
+            const float *value, const float *sine, const float *versine, const double *loose,
+            const unsigned char *skip, unsigned char *sure)
+{
+    pose joints[s->joints + s->loose], poses[s->bodies];
+    for (int first = 0; first < count; first += LANES) {
+        int rows = count - first < LANES ? count - first : LANES, unsure[LANES];
+        place(s, first, count, value, sine, versine, loose, joints, poses);
+        for (int l = 0; l < rows; l++)
+            sure[first + l] = 1;
+        for (int p = 0; p < pairs; p++) {
+            int a = pair[2 * p], b = pair[2 * p + 1], wanted = 0;
+            for (int l = 0; l < rows; l++)
+                wanted |= sure[first + l] && !skip[(long)(first + l) * pairs + p];
+            if (!wanted || !pair_near(s, poses, a, b, padding[p], unsure))
+                continue;
+            for (int l = 0; l < rows; l++)
+                if (unsure[l] && sure[first + l] && !skip[(long)(first + l) * pairs + p])
+                    sure[first + l] = split(s, poses, a, b, l, padding[p]);
         }
     }
 }
@@ -280,11 +357,11 @@ static INLINE void box_gap(const pose *b, const float *half_a, const float *half
 
 /* The same to least (count, pairs): what the distance of a pair of bodies is at least. */
 WIDEST void gaps(const scene *s, int pairs, const int *pair, int count, const float *value,
-          const float *sine, const float *versine, const double *loose, float *least)
+          const float *sine, const float *versine, float *least)
 {
-    pose joints[s->joints + s->loose], poses[s->bodies];
+    pose joints[s->joints], poses[s->bodies];
     for (int first = 0; first < count; first += LANES) {
-        place(s, first, count, value, sine, versine, loose, joints, poses);
+        place(s, first, count, value, sine, versine, 0, joints, poses);
         for (int p = 0; p < pairs; p++) {
             int a = pair[2 * p], b = pair[2 * p + 1];
             pose b_in_a, a_in_b;

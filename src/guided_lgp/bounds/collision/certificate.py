@@ -102,28 +102,44 @@ class Certificate:
         self._joint[body] = carrier
         self._frame[body] = flat(offset @ placement @ self._boxes[body])
 
-    def near(
-        self,
-        values: Array,
-        pairs: NDArray[np.intc],
-        padding: float | Array,
-        loose: Array | None = None,
-    ) -> NDArray[np.bool_]:
+    def near(self, values: Array, pairs: NDArray[np.intc], padding: float) -> NDArray[np.bool_]:
         """Which pairs (m, p) of bodies may be near each other; all of them without a compiler.
 
         Args:
             values: (m, joints) of the moving joints (rad or m).
             pairs: (p, 2) numbers of bodies, contiguous.
-            padding: the distance (m) at which they are near, of all or of each pair (p,); if it is
-                negative, they are only where they are deeper than that in each other.
-            loose: (m, loose bodies, 7) where these are, contiguous, if there are some.
+            padding: the distance (m) at which they are near.
         """
         if self._library is None:
             return np.ones((len(values), len(pairs)), dtype=np.bool_)
         near = np.zeros((len(values), len(pairs)), dtype=np.bool_)
-        apart = np.full(len(pairs), padding + _ROUNDING, dtype=np.float32)
-        self._find(self._library.certify, near, values, pairs, address(apart), loose=loose)
+        self._find(self._library.certify, values, pairs, near, padding=np.full(len(pairs), padding))
         return near
+
+    def apart(
+        self,
+        values: Array,
+        pairs: NDArray[np.intc],
+        padding: Array,
+        loose: Array,
+        skipped: NDArray[np.bool_],
+    ) -> NDArray[np.bool_]:
+        """In which configurations (m,) all pairs are surely apart; in none without a compiler.
+
+        Searches longer than :meth:`near`, where it has to.
+
+        Args:
+            values: see :meth:`near`.
+            pairs: the same.
+            padding: (p,) distances (m) that they have at least; negative ones let them be so deep
+                in each other.
+            loose: (m, loose bodies, 7) where these are, contiguous.
+            skipped: (m, p) pairs that are not looked at.
+        """
+        sure = np.zeros(len(values), dtype=np.bool_)
+        if self._library is not None:
+            self._find(self._library.settle, values, pairs, loose, skipped, sure, padding=padding)
+        return sure
 
     def gaps(self, values: Array, pairs: NDArray[np.intc]) -> NDArray[np.float32]:
         """What the distances (m, p) of pairs are at least (m); nothing is known without a compiler.
@@ -132,21 +148,24 @@ class Certificate:
         """
         least = np.full((len(values), len(pairs)), -np.inf, dtype=np.float32)
         if self._library is not None:
-            self._find(self._library.gaps, least, values, pairs)
+            self._find(self._library.gaps, values, pairs, least)
         return least - np.float32(_ROUNDING)
 
     def _find(
         self,
         function: Any,
-        found: NDArray[Any],
         values: Array,
         pairs: NDArray[np.intc],
-        *options: ctypes.c_void_p,
-        loose: Array | None = None,
+        *others: NDArray[Any],
+        padding: Array | None = None,
     ) -> None:
+        """Call compiled code with what follows the values there."""
         plain = np.ascontiguousarray(values[:, self._columns], dtype=np.float32)
-        arrays = (plain, np.sin(plain), 1 - np.cos(plain), loose, found)
-        given = (ctypes.byref(self._scene), len(pairs), address(pairs), *options)
+        given = [ctypes.byref(self._scene), len(pairs), address(pairs)]
+        if padding is not None:
+            apart = (padding + _ROUNDING).astype(np.float32)
+            given.append(address(apart))
+        arrays = (plain, np.sin(plain), 1 - np.cos(plain), *others)
         function(*given, len(values), *map(address, arrays))
 
 

@@ -3,6 +3,7 @@
 What is not certified is for PyBullet to judge, so a verdict is the same with this and without.
 """
 
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 from itertools import combinations
@@ -61,32 +62,36 @@ class KeyframeCertificate:
             (gripper, arm.fingers.opened, arm.fingers.ratios.tolist())
             for gripper, arm in robot.arms.items()
         ]
-        self._hands = {gripper: _firm_parts(robot, gripper) for gripper in robot.grippers}
-        firm = {link for links in self._hands.values() for link in links}
+        hands = {gripper: _firm_parts(robot, gripper) for gripper in robot.grippers}
         pairs = list(_pairs(robot, names, self._boxes))
-        deep = [pair for pair in pairs if names[pair[0]] in firm and names[pair[1]] in self._boxes]
+        between = defaultdict[_Pair, list[int]](list)
+        for number, (one, other) in enumerate(pairs):
+            between[names[one], names[other]].append(number)
+            between[names[other], names[one]].append(number)
+        bodies = {*names} - {*robot.description.links}
+        self._resting = {(b, below): between[b, below] for b in self._boxes for below in bodies}
+        self._held = {
+            (box, gripper): [number for link in links for number in between[link, box]]
+            for gripper, links in hands.items()
+            for box in self._boxes
+        }
+        deep = [pairs[number] for those in self._held.values() for number in those]
         self._pairs = np.array(pairs + deep, dtype=np.intc)
-        self._names: list[_Pair | None] = [(names[one], names[other]) for one, other in pairs]
-        self._names += [None] * len(deep)
         self._padding = np.full(len(self._pairs), _SLACK - MARGIN)
         self._padding[len(pairs) :] = _SLACK - HAND_DEPTH
 
     def clear(self, moments: Sequence[Moment]) -> list[bool]:
         """In which moments nothing is deeper in something else than it may."""
         values = np.array([self._moving(moment) for moment in moments])
-        places = np.concatenate(
-            [moment.keyframe.boxes[box] for moment in moments for box in self._boxes]
+        places = [moment.keyframe.boxes[box] for moment in moments for box in self._boxes]
+        skipped = np.zeros((len(moments), len(self._pairs)), dtype=np.bool_)
+        for row, moment in zip(skipped, moments, strict=True):
+            row[self._touching(moment)] = True
+        sure = self._certificate.apart(
+            values, self._pairs, self._padding, np.concatenate(places), skipped
         )
-        near = self._certificate.near(values, self._pairs, self._padding, places)
-        found: list[set[_Pair | None]] = [set() for _ in moments]
-        for row, pair in zip(*(where.tolist() for where in near.nonzero()), strict=True):
-            found[row].add(self._names[pair])
-        return [
-            finite and pairs <= self._touching(moment)
-            for pairs, moment, finite in zip(
-                found, moments, np.isfinite(values.sum(axis=1)).tolist(), strict=True
-            )
-        ]
+        clear: list[bool] = (sure & np.isfinite(values.sum(axis=1))).tolist()
+        return clear
 
     def _moving(self, moment: Moment) -> list[float]:
         """Values (m,) of all moving joints."""
@@ -96,11 +101,10 @@ class KeyframeCertificate:
             values += [ratio * value for ratio in ratios]
         return values
 
-    def _touching(self, moment: Moment) -> set[_Pair | None]:
-        """Pairs that may be in each other; of hands, where they are not too deep: see ``None``."""
-        items = moment.support.items()
-        touching: set[_Pair | None] = {*items, *((below, box) for box, below in items)}
-        touching.update((link, box) for box, hand in moment.held for link in self._hands[hand])
+    def _touching(self, moment: Moment) -> list[int]:
+        """Pairs that may be in each other; of hands, others say that they are not too deep."""
+        touching = [n for pair in moment.support.items() for n in self._resting[pair]]
+        touching += [n for pair in moment.held for n in self._held[pair]]
         return touching
 
 
