@@ -2,12 +2,15 @@
 
 from functools import cache
 
+import numpy as np
 import pytest
 
-from guided_lgp.bounds.execution.forces import RATIO, grips_of
+from guided_lgp.bounds.checks import box_bodies
+from guided_lgp.bounds.execution.forces import grips_of
 from guided_lgp.bounds.path.firm import firmest
-from guided_lgp.bounds.results import PathResult
+from guided_lgp.bounds.results import CoarseResult, PathResult
 from guided_lgp.bounds.scene_bounds import SceneBounds
+from guided_lgp.bounds.terms.steady import RATIO, check
 from guided_lgp.bounds.verify.attachments import switches_of
 from guided_lgp.logic import parse_skeleton
 from guided_lgp.params import load_planning
@@ -58,3 +61,26 @@ def test_the_next_motion_is_taken_where_one_does_not_hold() -> None:
     motions = iter([motion(firm=False), motion(firm=True), motion(firm=False)])
     assert firmest(SCENE, motions) is motion(firm=True)
     assert len(list(motions)) == 1
+
+
+def test_the_program_takes_the_box_nearer_to_what_it_will_carry() -> None:
+    """The verdict on the sequence is the same; then red is held where green does not turn it."""
+    bound = SceneBounds(SCENE, load_planning().bounds, firm=True)
+    for length in range(1, len(LOADED) + 1):
+        plain = bound.coarse(LOADED[:length])
+    assert plain.feasible
+    paper = SceneBounds(SCENE, load_planning().bounds).coarse(LOADED)
+    assert np.array_equal(plain.at_switch[2].q, paper.at_switch[2].q)
+    steady = bound._coarse_bound.finish(plain)
+    assert steady.feasible
+    assert at_rest(plain) > 0.6
+    assert at_rest(steady) < 0.5
+
+
+def at_rest(found: CoarseResult) -> float:
+    """The share of what its pads can carry that the hand with red needs, green on it."""
+    keyframe, bodies = found.after_action[2], box_bodies(SCENE)
+    tool = SCENE.robot.tool_pose(keyframe.q, "pr2R").tolist()
+    loads = [(bodies[box].volume, tuple(keyframe.boxes[box][:3])) for box in ("red", "green")]
+    fingers = SCENE.robot.description.arms["pr2R"].fingers
+    return check(bodies["red"], keyframe.boxes["red"].tolist(), tool, fingers, loads)

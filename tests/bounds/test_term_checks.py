@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from guided_lgp.bounds.checks import Top
+from guided_lgp.bounds.checks import GRAVITY, Top
 from guided_lgp.bounds.coarse.solver import default_solver
 from guided_lgp.bounds.program.geometry import GraspSide
 from guided_lgp.bounds.program.grasp import PALM_GAP, tool_targets
@@ -14,13 +14,23 @@ from guided_lgp.bounds.program.kernels import SCALE
 from guided_lgp.bounds.program.kinematics import kinematics_of
 from guided_lgp.bounds.program.slots import HeldBox
 from guided_lgp.bounds.results import Array
-from guided_lgp.bounds.terms import at, balanced, carried, hold, kernel_table, pads, stand, within
+from guided_lgp.bounds.terms import (
+    at,
+    balanced,
+    carried,
+    hold,
+    kernel_table,
+    pads,
+    stand,
+    steady,
+    within,
+)
 from guided_lgp.poses import compose, pose, quaternion
 from guided_lgp.scene import Box, PlacedRobot, Scene, Table
 from guided_lgp.scene.footprints import footprint, gap
 from guided_lgp.scene.shapes import Convex
 from guided_lgp.scene.tolerances import BALANCE_INSET
-from guided_lgp.scene.world import World
+from guided_lgp.scene.world import BOX_DENSITY, World
 
 PLACED = PlacedRobot(base=(0.0, 0.0, 0.0))
 ROBOT = PLACED.description
@@ -120,6 +130,42 @@ def test_pads_of_a_cylinder_are_at_its_axis() -> None:
     assert excess[0] < 0
     assert excess[1] < 0
     assert excess[2] > 0.01
+
+
+def test_steady() -> None:
+    """With a box and two others on it, where no pad reaches over an edge."""
+    rng, verdicts = np.random.default_rng(2), []
+    fingers, palm_front = ROBOT.arms["pr2L"].fingers, ROBOT.arms["pr2L"].palm_front
+    body, volumes = Convex("box", (HALF_LENGTH, SIZE[1] / 2, HALF_HEIGHT)), (1e-3, 8e-4, 1.2e-3)
+    weight = BOX_DENSITY * sum(volumes) * GRAVITY
+    bound = 2 * steady.FRICTION * fingers.force * fingers.pad / weight
+    shares = [volume / sum(volumes) for volume in volumes[1:]] + 6 * [0.0]
+    least = weight / (2 * steady.FRICTION * fingers.force)
+    for _ in range(200):
+        grip = np.array([rng.uniform(0.0, np.pi), rng.uniform(-0.04, 0.04), 0.04])
+        place = np.array([*rng.uniform(-1, 1, 2), rng.uniform(-np.pi, np.pi)])
+        points = place[:2] + rng.uniform(-0.3, 0.3, (2, 2))
+        x = np.concatenate([grip, place, points.ravel(), np.zeros(12)])
+        rows = residual("steady_0", x, np.array([HALF_LENGTH, HALF_HEIGHT, 0.0, bound, *shares]))
+        there, pitches = np.array([[*place, 0.7]]), grip[:1]
+        rotation, position = tool_targets(
+            held(), (grip[1], grip[2]), there, pitches, np.zeros((1, 2)), palm_front
+        )
+        tool = [*position[0, 0, 0], *quaternion(rotation[0, 0, 0])]
+        placement = pose((*place[:2], 0.7), place[2]).tolist()
+        if pads.check(body, placement, tool) < -0.008:
+            centres = [(*place[:2], 0.7), *((*point, 0.8) for point in points)]
+            loads = list(zip(volumes, centres, strict=True))
+            share = steady.check(body, placement, tool, fingers, loads)
+            assert share == pytest.approx(max(least, 1 - rows.min() / bound), abs=1e-4)
+            verdicts.append(rows.min() > 0)
+    both_verdicts(verdicts)
+
+
+def test_pads_over_an_edge_carry_less() -> None:
+    body = Convex("box", (HALF_LENGTH, SIZE[1] / 2, HALF_HEIGHT))
+    shares = [steady.on_box(body, (x, 0.0, 0.0), 1, 0.0106) for x in (0.0, 0.06, 0.075, 0.09)]
+    assert shares == pytest.approx([1.0, 1.0, 0.5, 0.1])
 
 
 @pytest.mark.parametrize("name", balanced.SUMS)

@@ -15,6 +15,8 @@ from guided_lgp.poses import Array, compose, pose
 from guided_lgp.scene import Scene
 from guided_lgp.scene.shapes import Convex
 
+GRAVITY = 9.81
+"""m/s²."""
 Pose = Sequence[float]
 Vector = tuple[float, float, float]
 

@@ -1,7 +1,7 @@
 """What an objective adds to the geometry of a plan: terms at its end, and all the time."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -45,6 +45,11 @@ class GoalTerms:
             term.symbols[0]: np.array([float(value) for value in term.options.values()])
             for term in self.postures
         }
+
+    def held_steadily(self, grippers: Iterable[str]) -> "GoalTerms":
+        """These, and that no load turns what grippers hold."""
+        steady = (GroundTerm("steady", (gripper,)) for gripper in grippers)
+        return replace(self, lasting=(*self.lasting, *steady))
 
     def about(self, box: str) -> "GoalTerms":
         """Those at the end that are about one box."""

@@ -51,7 +51,7 @@ class SceneBounds:
         self.scene = scene
         self._goals = GoalTerms.of(objective, scene.symbols.domain)
         self._coarse_bound = CoarseBound(
-            scene, params.coarse_restarts, deadline=deadline, goals=self._goals
+            scene, params.coarse_restarts, deadline=deadline, goals=self._goals, firm=firm
         )
         self._path_solutions, self._firm = params.path_solutions, firm
         self._shorten, self._clock = shorten, clock

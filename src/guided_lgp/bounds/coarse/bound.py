@@ -5,6 +5,7 @@ import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
+from itertools import accumulate
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from guided_lgp.bounds.program.geometry import SceneGeometry
 from guided_lgp.bounds.results import Array, CoarseResult, Failure, Keyframe
 from guided_lgp.bounds.terms.term import UngraspableError
 from guided_lgp.bounds.verify import verify_keyframes
-from guided_lgp.logic import Skeleton, format_skeleton
+from guided_lgp.logic import Skeleton, format_skeleton, successor
 from guided_lgp.scene import Scene
 from guided_lgp.scene.world import World, world_of
 
@@ -51,6 +52,7 @@ class CoarseBound:
         facts: Facts | None = None,
         world: World | None = None,
         goals: GoalTerms = NO_TERMS,
+        firm: bool = False,
     ) -> None:
         """Prepare a scene.
 
@@ -63,6 +65,7 @@ class CoarseBound:
             world: of this scene, if there is one already.
             goals: terms of which those of every moment always hold, and those of the end in
                 ``finish`` and ``solutions``.
+            firm: whether hands then hold their load steadily, where they can.
         """
         self.scene = scene
         self._restarts = restarts
@@ -72,6 +75,9 @@ class CoarseBound:
         self._geometry = SceneGeometry(scene)
         self.facts = facts or Facts(self._geometry)
         self._formulators = Formulators(self._geometry, goals)
+        self._firm = firm
+        self._steady = goals.held_steadily(scene.robot.description.grippers)
+        self._steady_formulators = Formulators(self._geometry, self._steady)
         self._starts = Starts(self._geometry, self._solver)
         self._decoder = Decoder(self._geometry)
         self._settings = Settings()
@@ -107,17 +113,50 @@ class CoarseBound:
         return CoarseSolution(**(vars(result) | {"time_s": elapsed}))
 
     def finish(self, result: CoarseResult) -> CoarseResult:
-        """The verdict on a skeleton at whose end the terms of the goals hold, from one without."""
-        if not result.feasible or not self._goals.final:
-            return result
+        """The verdict on a skeleton at whose end the terms of the goals hold, from one without.
+
+        Of firm bounds the solution nearest to it in which hands hold their load steadily.
+        """
         started = time.perf_counter()
-        programs = self._programs(result.skeleton, self._goals)
-        found = self._first_feasible(programs, None, programs.variants.starts(self._restarts))
-        return replace(found, time_s=time.perf_counter() - started)
+        if result.feasible and self._goals.final:
+            programs = self._programs(result.skeleton, self._goals)
+            found = self._first_feasible(programs, None, programs.variants.starts(self._restarts))
+            result = replace(found, time_s=time.perf_counter() - started)
+        if isinstance(result, CoarseSolution) and result.feasible and self._loads(result.skeleton):
+            found = self._held_steadily(result)
+            result = replace(found, time_s=time.perf_counter() - started)
+        return result
+
+    def _loads(self, skeleton: Skeleton) -> bool:
+        """Whether hands hold boxes that carry others, and shall do so steadily."""
+        states = accumulate(skeleton, successor, initial=self.scene.state)
+        return self._firm and any(s.standing_on(box) for s in states for box, _ in s.held)
+
+    def _held_steadily(self, found: CoarseSolution) -> CoarseSolution:
+        """The solution near one in which hands hold their load steadily; that one without any."""
+        programs = self._programs(found.skeleton, self._steady)
+        formulation = programs.built(0, found.variant)
+        random = _random(found.skeleton, 0)
+        start = self._starts.draw(formulation, random, noise=0.0, warm_start=found.values)
+        solution = self._solver.solve(formulation.program, start, self._settings)
+        steady = self._check(
+            programs, formulation, found.variant, solution, restarts=found.restarts, prefix=None
+        )
+        return steady if steady.feasible else found
 
     def solutions(self, skeleton: Skeleton, count: int) -> Iterator[CoarseResult]:
-        """Up to ``count`` further verified solutions, with the goals, from independent starts."""
-        programs = self._programs(skeleton, self._goals)
+        """Up to ``count`` further verified solutions, with the goals, from independent starts.
+
+        Of firm bounds first as many in which hands hold their load steadily.
+        """
+        if self._loads(skeleton):
+            yield from self._from_starts(skeleton, self._steady, count)
+        yield from self._from_starts(skeleton, self._goals, count)
+
+    def _from_starts(
+        self, skeleton: Skeleton, goals: GoalTerms, count: int
+    ) -> Iterator[CoarseResult]:
+        programs = self._programs(skeleton, goals)
         found = 0
         for number in range(self._restarts, self._restarts + 3 * count):
             try:
@@ -131,7 +170,9 @@ class CoarseBound:
                 return
 
     def _programs(self, skeleton: Skeleton, goals: GoalTerms) -> Programs:
-        return Programs(self._formulators, self._geometry, skeleton, goals)
+        steady = goals is self._steady
+        formulators = self._steady_formulators if steady else self._formulators
+        return Programs(formulators, self._geometry, skeleton, goals)
 
     def _search(self, skeleton: Skeleton, prefix: CoarseSolution | None) -> CoarseSolution:
         """The verdict on a skeleton, whose prefix is feasible, without the goals' places."""

@@ -24,6 +24,7 @@ from guided_lgp.bounds.terms import find_term
 from guided_lgp.bounds.terms.apart import keep_apart
 from guided_lgp.bounds.terms.clear import surroundings
 from guided_lgp.bounds.terms.hold import take_over
+from guided_lgp.bounds.terms.steady import keep_steady
 from guided_lgp.bounds.terms.term import GoalTerm
 from guided_lgp.logic import Action, GroundInstruction, GroundTerm, Skeleton, successor
 
@@ -168,6 +169,7 @@ class Formulator:
         below = None if support is None else context.after.support_of(support)
         if support is not None and below is not None:
             self._add("balanced", support, below)
+        keep_steady(context)
         context.end()
 
     def _add(self, name: str, *symbols: str, **options: object) -> None:

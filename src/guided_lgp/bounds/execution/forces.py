@@ -5,21 +5,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from guided_lgp.bounds.checks import box_bodies, box_sizes, closing_axis, volumes
+from guided_lgp.bounds.checks import GRAVITY, box_bodies, box_sizes, closing_axis, volumes
 from guided_lgp.bounds.results import Array, Attachment, Trajectory
+from guided_lgp.bounds.terms.steady import FRICTION, RATIO, on_box
 from guided_lgp.bounds.verify.attachments import spans
-from guided_lgp.bounds.verify.efforts import GRAVITY, Carried, carried_boxes, derivatives
+from guided_lgp.bounds.verify.efforts import Carried, carried_boxes, derivatives
 from guided_lgp.logic import Skeleton
 from guided_lgp.poses import IDENTITY, compose, inverse, rotate
 from guided_lgp.scene import Scene
 from guided_lgp.scene.world import BOX_DENSITY
 
-FRICTION = 0.6
-"""Coefficient of friction that grips are made for: cardboard on rubber."""
-RATIO = 0.5
-"""Share of what the pads can carry that a load should take."""
 MOST = 0.6
-"""The share that it may take: at 0.62 boxes stayed still in the hand, at 0.72 they turned."""
+"""The share of what the pads can carry that a load may take: at 0.62 boxes stayed still in the
+hand, at 0.72 they turned."""
 LEAST = 40.0
 """N: softer grips are not worth their risk."""
 SQUEEZE = 0.004
@@ -80,7 +78,8 @@ def _grip(
     across = closing_axis(IDENTITY.tolist(), inverse(own.grip).tolist())
     width = float(box_sizes(scene)[span.box][across])
     riders = [load for load in loads if load.span.gripper == span.gripper and _during(load, span)]
-    radius = fingers.pad * _share_on_box(scene, own, across, fingers.pad)
+    body, middle = box_bodies(scene)[span.box], inverse(own.grip)[:3].tolist()
+    radius = fingers.pad * on_box(body, middle, across, fingers.pad)
     need = _need(scene, tools, times, riders, radius)
     force = float(np.clip(need / RATIO, LEAST, max(fingers.force, LEAST)))
     closing = fingers.value(width - SQUEEZE)
@@ -90,15 +89,6 @@ def _grip(
 def _during(load: Carried, span: Attachment) -> bool:
     """Whether a load is carried while a span lasts."""
     return load.span.start < span.end and load.span.end > span.start
-
-
-def _share_on_box(scene: Scene, load: Carried, across: int, pad: float) -> float:
-    """How much of a square pad lies on the side of the box that it presses on; a tenth at least."""
-    middle = inverse(load.grip)[:3]
-    half, touched = pad / np.sqrt(2), box_bodies(scene)[load.span.box].side(across)
-    axes = [axis for axis in range(3) if axis != across]
-    over = np.array([touched[axis] - abs(middle[axis]) + half for axis in axes])
-    return float(max(0.1, np.prod(np.clip(over / (2 * half), 0.0, 1.0))))
 
 
 def _need(

@@ -4,9 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from guided_lgp.bounds.checks import GRAVITY
 from guided_lgp.bounds.execution.conditions import Conditions
 from guided_lgp.bounds.results import Array, Trajectory
-from guided_lgp.bounds.verify.efforts import GRAVITY, own_weights
+from guided_lgp.bounds.verify.efforts import own_weights
 from guided_lgp.robots.hand_parts import parts_of
 from guided_lgp.scene.bullet import pybullet
 from guided_lgp.scene.world import World

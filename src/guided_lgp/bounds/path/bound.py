@@ -121,6 +121,7 @@ class PathBound:
                 number,
                 self._goals,
                 self._coarse.overhung,
+                self._firm,
             )
             limit = self._mover.queries + _QUERIES * (len(skeleton) + 4)
             gathered = task.gathered()

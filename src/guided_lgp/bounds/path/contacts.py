@@ -8,6 +8,7 @@ import numpy as np
 
 from guided_lgp.bounds.path.foresight import Foresight
 from guided_lgp.bounds.path.grips import Grips
+from guided_lgp.bounds.path.loads import price_of_grips, price_of_places
 from guided_lgp.bounds.path.placing import STRATEGIES, PlacementSampler
 from guided_lgp.bounds.path.situation import Situation
 from guided_lgp.bounds.path.task import Task
@@ -68,8 +69,9 @@ class ContactSampler:
             if outlook is None:
                 continue
             rotation, position = grips.tools(box[:3], rotation_matrix(box[3:]))
+            cost = outlook.cost + price_of_grips(self._task, index, grips)
             for way in self._task.manoeuvres[index].way_in.ways:
-                yield Contacts(rotation, position, way.of(rotation), outlook.cost, outlook.possible)
+                yield Contacts(rotation, position, way.of(rotation), cost, outlook.possible)
 
     def _coarse_grip(self, index: int) -> Grips:
         """The coarse solution's own grip."""
@@ -91,6 +93,5 @@ class ContactSampler:
             tools = compose(np.array([place.pose for place in places]), grasp)
             rotation = rotation_matrix(tools[:, 3:])
             ways = [place.way.of(turn) for place, turn in zip(places, rotation, strict=True)]
-            yield Contacts(
-                rotation, tools[:, :3], np.array(ways), np.zeros(len(places)), lambda pose: True
-            )
+            cost = price_of_places(self._task, index, situation, boxes, places)
+            yield Contacts(rotation, tools[:, :3], np.array(ways), cost, lambda pose: True)

@@ -2,8 +2,9 @@
 
 from collections.abc import Iterator
 
-from guided_lgp.bounds.execution.forces import MOST, RATIO, Grip, grips_of
+from guided_lgp.bounds.execution.forces import MOST, Grip, grips_of
 from guided_lgp.bounds.results import Failure, PathResult
+from guided_lgp.bounds.terms.steady import RATIO
 from guided_lgp.bounds.verify.attachments import switches_of
 from guided_lgp.scene import Scene
 

@@ -148,6 +148,7 @@ class Task:
         seed: int,
         goals: GoalTerms,
         overhung: Collection[str] = (),
+        firm: bool = False,
     ) -> None:
         self.mover = mover
         self.arms = mover.arms
@@ -158,6 +159,8 @@ class Task:
         self.goals = goals
         self.overhung = overhung
         """What may be stood on and is, in part, below something else."""
+        self.firm = firm
+        """Whether grips should hold what hands carry."""
         self.scene = scene
         self.rng = np.random.default_rng(np.random.SeedSequence([7, seed]))
         self.boxes = {box.name: box for box in scene.movable}

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from guided_lgp.bounds.checks import Violation, volumes
+from guided_lgp.bounds.checks import GRAVITY, Violation, volumes
 from guided_lgp.bounds.results import Array, Attachment
 from guided_lgp.bounds.verify.attachments import carriers, spans
 from guided_lgp.logic import Skeleton
@@ -16,9 +16,6 @@ from guided_lgp.robots import Robot
 from guided_lgp.robots.kinematics import JointIndex, fill, joint_index
 from guided_lgp.scene import Scene
 from guided_lgp.scene.world import BOX_DENSITY, initial_poses
-
-GRAVITY = 9.81
-"""m/s²."""
 
 
 @dataclass(frozen=True)
