@@ -94,10 +94,15 @@ def address(array: NDArray[Any] | None) -> ctypes.c_void_p:
     By the buffer of what may be written, which is five times faster than by ``array.ctypes``.
     """
     if array is None or not array.size:
-        return ctypes.c_void_p(None)
-    if array.flags.writeable:
-        return ctypes.c_void_p(ctypes.addressof(ctypes.c_char.from_buffer(array)))  # type: ignore[arg-type]
-    return ctypes.c_void_p(array.ctypes.data)
+        return _NULL
+    try:
+        return ctypes.c_void_p(ctypes.addressof(_read(array)))
+    except TypeError:  # it may not be written
+        return ctypes.c_void_p(array.ctypes.data)
+
+
+_read: Callable[[NDArray[Any]], ctypes.c_char] = ctypes.c_char.from_buffer  # type: ignore[assignment]
+_NULL = ctypes.c_void_p(None)
 
 
 def _compilers() -> Iterator[list[str]]:

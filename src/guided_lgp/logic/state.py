@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 from guided_lgp.logic.actions import Goal
@@ -26,6 +27,18 @@ class State:
     facts: tuple[Fact, ...]
     domain: "Domain" = field(compare=False, repr=False)
 
+    @cached_property
+    def _supports(self) -> Mapping[str, str]:
+        return dict(self.support)
+
+    @cached_property
+    def _standing(self) -> Mapping[str, tuple[str, ...]]:
+        """The bodies that stand directly on each support, sorted."""
+        found: dict[str, tuple[str, ...]] = {}
+        for body, below in self.support:
+            found[below] = (*found.get(below, ()), body)
+        return found
+
     def holder(self, body: str) -> str | None:
         """The gripper that holds the body, if any."""
         return next((gripper for held, gripper in self.held if held == body), None)
@@ -36,7 +49,7 @@ class State:
 
     def support_of(self, body: str) -> str | None:
         """What the body stands on; None while it is held."""
-        return next((support for standing, support in self.support if standing == body), None)
+        return self._supports.get(body)
 
     def parent_of(self, body: str) -> str:
         """What the body hangs on: its support or gripper."""
@@ -48,12 +61,12 @@ class State:
 
     def standing_on(self, support: str) -> tuple[str, ...]:
         """The bodies that stand directly on a table or body, sorted."""
-        return tuple(body for body, below in self.support if below == support)
+        return self._standing.get(support, ())
 
     def carried_by(self, support: str) -> tuple[str, ...]:
         """The bodies that stand on a table or body directly or through others."""
         direct = self.standing_on(support)
-        return direct + tuple(body for below in direct for body in self.carried_by(below))
+        return direct and direct + tuple(b for below in direct for b in self.carried_by(below))
 
     def satisfies(self, goal: Goal) -> bool:
         """Whether the goal holds in this state."""

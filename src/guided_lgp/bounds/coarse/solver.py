@@ -98,13 +98,12 @@ class _CSettings(ctypes.Structure):
 class _CGrid(ctypes.Structure):
     _fields_ = (
         ("shape", ctypes.c_int * 4),
-        *((field.name, ctypes.c_void_p) for field in fields(Grid)),
+        *((name, ctypes.c_void_p) for name in Grid._fields),
     )
 
     @classmethod
     def of(cls, grid: Grid) -> "_CGrid":
-        arrays = grid.candidates, grid.grasp, grid.poses, grid.pitches, grid.ends
-        return cls(grid.shape, *map(address, arrays))
+        return cls(grid.shape, *map(address, grid))
 
 
 @cache

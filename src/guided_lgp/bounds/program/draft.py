@@ -79,6 +79,6 @@ def pose_values(
         pose: slots.
     """
     x, y, yaw, z = (
-        float(values[slot if slot >= 0 else variables - 1 - slot]) for slot in (*pose.plane, pose.z)
+        values.item(slot if slot >= 0 else variables - 1 - slot) for slot in (*pose.plane, pose.z)
     )
     return x, y, yaw, z + pose.offset

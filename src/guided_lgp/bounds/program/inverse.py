@@ -5,9 +5,8 @@ general inverse kinematics.
 """
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from functools import cache, partial
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import casadi as ca
 import numpy as np
@@ -37,8 +36,7 @@ _VALUES = 12
 _TURN = 2 * np.pi
 
 
-@dataclass(frozen=True)
-class Grid:
+class Grid(NamedTuple):
     """Arguments of a closed form: every pose with every pitch, end and candidate."""
 
     candidates: Array

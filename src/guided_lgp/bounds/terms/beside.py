@@ -7,6 +7,7 @@ angle is a variable of the pair. What ends below the box, or begins above its wa
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from math import cos, sin
 from typing import Any
 
 import casadi as ca
@@ -46,7 +47,7 @@ class Separation:
         reach = math.hypot(a, b) + math.hypot(c, d)
         return np.array(
             [
-                max(0.0, -_separation(place, second, self.halves)[0])
+                max(0.0, -_separation(place, second, self.halves, enough=0.0)[0])
                 if math.dist(place[:2], second[:2]) < reach
                 else 0.0
                 for place in first.tolist()
@@ -109,23 +110,31 @@ def _separate(context: Context, name: str, other: str) -> None:
 
 
 def _separation(
-    first: Sequence[float], second: Sequence[float], halves: tuple[float, float, float, float]
+    first: Sequence[float],
+    second: Sequence[float],
+    halves: tuple[float, float, float, float],
+    enough: float = math.inf,
 ) -> tuple[float, float]:
     """Largest distance (m) along the boxes' axes that separates them, and that direction (rad).
 
-    In plain numbers: for two places many times faster than with arrays.
+    In plain numbers: for two places many times faster than with arrays. The first distance that is
+    enough will do.
     """
-    dx, dy = second[0] - first[0], second[1] - first[1]
+    dx, dy, one, other = second[0] - first[0], second[1] - first[1], first[2], second[2]
+    along, across, others_along, others_across = halves
     best, direction = -math.inf, 0.0
-    for yaw in (first[2], second[2]):
+    for yaw in (one, other):
         for quarter in _QUARTERS:
             angle = yaw + quarter
-            distance = dx * math.cos(angle) + dy * math.sin(angle)
-            for turn, along, across in ((first[2], *halves[:2]), (second[2], *halves[2:])):
-                distance = distance - along * abs(math.cos(angle - turn))
-                distance = distance - across * abs(math.sin(angle - turn))
+            distance = dx * cos(angle) + dy * sin(angle)
+            distance -= along * abs(cos(angle - one))
+            distance -= across * abs(sin(angle - one))
+            distance -= others_along * abs(cos(angle - other))
+            distance -= others_across * abs(sin(angle - other))
             if distance > best:
                 best, direction = distance, angle
+                if best >= enough:
+                    return best, direction
     return best, direction
 
 

@@ -241,35 +241,53 @@ def start(draft: Draft, held: HeldBox) -> None:
     configurations = draft.configurations[held]
     if all(configuration.joints[0] < draft.kept for configuration in configurations):
         return
-    places = [draft.pose(configuration.pose) for configuration in configurations]
-    tried = pitches(draft, held)
+    tried = _pitches(draft, held)
     if held.given is None and held.pitch >= draft.kept:
         tried = tried + draft.noise * draft.generator.uniform(-_PITCH_SPREAD, _PITCH_SPREAD)
         costs = sum(
-            least_costs(draft, held, place[None], configuration.segments, tried)[0]
-            for configuration, place in zip(configurations, places, strict=True)
+            _least_costs(draft, held, _place(draft, configuration), configuration.segments, tried)
+            for configuration in configurations
         )
-        tried = tried[[draft.choose(np.asarray(costs))]]
+        tried = tried[[draft.choose(np.asarray(costs)[0])]]
         draft.values[held.pitch] = tried[0]
-    for configuration, place in zip(configurations, places, strict=True):
+    for configuration in configurations:
         if configuration.joints[0] >= draft.kept:
-            ends = _ends(configuration.segments)
-            solve = draft.ik[held.gripper]
-            joints, costs = solve(held, _hand(draft, held), place[None], tried, ends)
+            place, ends = _place(draft, configuration), _ends(configuration.segments)
+            joints, costs = draft.ik[held.gripper](held, _hand(draft, held), place, tried, ends)
             chosen = draft.choose(costs[0, 0])
             slots_of = (configuration.joints, *(s.joints for s in configuration.segments))
             for slots, values in zip(slots_of, joints[0, 0, :, chosen], strict=True):
                 draft.values[list(slots)] = values
 
 
-def pitches(draft: Draft, held: HeldBox) -> Array:
+def costs_of_both(
+    draft: Draft, held: HeldBox, poses: Array, segments: tuple[StraightSegment, ...]
+) -> Array:
+    """Least costs (len(poses),) of holding a box at the start of its mode and at one of the poses.
+
+    Where there is one pitch alone, the start costs the same for all, and is left out.
+    """
+    tried = _pitches(draft, held)
+    costs = _least_costs(draft, held, poses, segments, tried)
+    if len(tried) > 1:
+        first = draft.configurations[held][0]
+        costs = _least_costs(draft, held, _place(draft, first), first.segments, tried) + costs
+    return np.asarray(costs.min(axis=1))
+
+
+def _pitches(draft: Draft, held: HeldBox) -> Array:
     """Pitches (rad) that are tried: the one of before where there is one."""
     if held.given is not None or held.pitch < draft.kept:
         return draft.values[[held.pitch]]
     return _PITCHES
 
 
-def least_costs(
+def _place(draft: Draft, configuration: ArmConfiguration) -> Array:
+    """Pose (1, 4) of the box in a configuration."""
+    return np.array([draft.place(configuration.pose)])
+
+
+def _least_costs(
     draft: Draft,
     held: HeldBox,
     poses: Array,

@@ -12,7 +12,7 @@ import numpy as np
 from guided_lgp.bounds.program.context import Context
 from guided_lgp.bounds.program.draft import Draft
 from guided_lgp.bounds.program.slots import ArmConfiguration, PlanarPose
-from guided_lgp.bounds.terms.hold import configuration, least_costs, pitches
+from guided_lgp.bounds.terms.hold import configuration, costs_of_both
 from guided_lgp.bounds.terms.term import Term
 from guided_lgp.logic.declarations import Instruction, Variable
 
@@ -44,12 +44,9 @@ class Offer:
         candidates[:, 2] = draft.generator.uniform(-np.pi / 2, np.pi / 2, _CANDIDATES)
         lowest = draft.lower[pose.z]
         candidates[:, 3] = lowest + draft.generator.uniform(0.0, 0.1, _CANDIDATES)
-        first, tried = draft.configurations[held][0], pitches(draft, held)
-        grasp = least_costs(draft, held, draft.pose(first.pose)[None], first.segments, tried)
-        offer = least_costs(draft, held, candidates, self.configuration.segments, tried)
-        best = draft.choose((grasp + offer).min(axis=1))
-        for slot, value in zip((*pose.plane, pose.z), candidates[best], strict=True):
-            draft.values[slot] = value
+        segments = self.configuration.segments
+        best = draft.choose(costs_of_both(draft, held, candidates, segments))
+        draft.values[[*pose.plane, pose.z]] = candidates[best]
 
 
 def _add(context: Context, body: str, by: str | None = None) -> None:

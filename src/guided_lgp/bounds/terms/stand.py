@@ -1,5 +1,6 @@
 """``stand(box, support)``: a box is put down level on a support, with all that it carries."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -13,7 +14,7 @@ from guided_lgp.bounds.results import Array
 from guided_lgp.bounds.terms import carried
 from guided_lgp.bounds.terms.balanced import inner
 from guided_lgp.bounds.terms.beside import Separation
-from guided_lgp.bounds.terms.hold import least_costs, pitches
+from guided_lgp.bounds.terms.hold import costs_of_both
 from guided_lgp.bounds.terms.term import Term, put_down
 from guided_lgp.scene.tolerances import HEIGHT, LEVEL_ANGLE
 
@@ -46,31 +47,28 @@ class Placement:
             return
         candidates = self._draw(draft)
         overlaps = self._overlaps(draft, candidates)
-        first, tried = draft.configurations[self.held][0], pitches(draft, self.held)
-        origin = draft.pose(first.pose)
-        grasp = least_costs(draft, self.held, origin[None], first.segments, tried)
-        place = least_costs(draft, self.held, candidates, self._segments(draft), tried)
-        best = draft.choose((grasp + place).min(axis=1) + overlaps)
-        for slot, value in zip(self.pose.plane, candidates[best], strict=False):
-            draft.values[slot] = value
+        place = costs_of_both(draft, self.held, candidates, self._segments(draft))
+        best = draft.choose(place + overlaps)
+        draft.values[list(self.pose.plane)] = candidates[best, :3]
         for before, after in self.carried:
             old, above, new = (draft.pose(pose) for pose in (self.old, before, self.pose))
             carried.carry(draft, old, above, new, after)
 
     def _draw(self, draft: Draft) -> Array:
         """Poses (CANDIDATES, 4) on the support."""
-        support = draft.pose(self.support)
-        height = np.full(CANDIDATES, support[3] + self.pose.offset - self.support.offset)
+        x, y, turn, z = draft.place(self.support)
+        height = z + self.pose.offset - self.support.offset
         if self.aim is not None:
-            return np.column_stack([self.aim(draft.generator, CANDIDATES, support), height])
-        local = draft.generator.uniform(-1, 1, (CANDIDATES, 2)) * np.array(self.half)
-        cosine, sine = np.cos(support[2]), np.sin(support[2])
-        candidates = np.empty((CANDIDATES, 4))
-        candidates[:, 0] = support[0] + cosine * local[:, 0] - sine * local[:, 1]
-        candidates[:, 1] = support[1] + sine * local[:, 0] + cosine * local[:, 1]
-        candidates[:, 2] = draft.generator.uniform(-np.pi / 2, np.pi / 2, CANDIDATES)
-        candidates[:, 3] = height
-        return candidates
+            places = self.aim(draft.generator, CANDIDATES, np.array((x, y, turn, z)))
+            return np.column_stack([places, np.full(CANDIDATES, height)])
+        local = (draft.generator.uniform(-1, 1, (CANDIDATES, 2)) * self.half).tolist()
+        yaws = draft.generator.uniform(-np.pi / 2, np.pi / 2, CANDIDATES).tolist()
+        cosine, sine = math.cos(turn), math.sin(turn)
+        candidates = []
+        for (along, across), yaw in zip(local, yaws, strict=True):
+            there = x + cosine * along - sine * across, y + sine * along + cosine * across
+            candidates.append((*there, yaw, height))
+        return np.array(candidates)
 
     def _overlaps(self, draft: Draft, candidates: Array) -> Array:
         """Costs (CANDIDATES,) of what each candidate overlaps beside it."""
