@@ -21,7 +21,7 @@ from guided_lgp.robots.kinematics import flat, moving_joints
 from guided_lgp.robots.measures.hulls import shape_vertices
 
 _ROUNDING = 1e-5
-"""What single precision may be off by (m), added to the padding."""
+"""What single precision may be off by (m): more padding than that."""
 
 
 class _Scene(ctypes.Structure):
@@ -113,14 +113,15 @@ class Certificate:
         if self._library is None:
             return np.ones((len(values), len(pairs)), dtype=np.bool_)
         near = np.zeros((len(values), len(pairs)), dtype=np.bool_)
-        self._find(self._library.certify, values, pairs, near, padding=np.full(len(pairs), padding))
+        apart = np.full(len(pairs), padding + _ROUNDING, dtype=np.float32)
+        self._find(self._library.certify, values, pairs, near, padding=apart)
         return near
 
     def apart(
         self,
         values: Array,
         pairs: NDArray[np.intc],
-        padding: Array,
+        padding: NDArray[np.float32],
         loose: Array,
         skipped: NDArray[np.bool_],
     ) -> NDArray[np.bool_]:
@@ -131,14 +132,15 @@ class Certificate:
         Args:
             values: see :meth:`near`.
             pairs: the same.
-            padding: (p,) distances (m) that they have at least; negative ones let them be so deep
-                in each other.
+            padding: (p,) distances (m) that they have at least, in single precision; negative ones
+                let them be so deep in each other.
             loose: (m, loose bodies, 7) where these are, contiguous.
             skipped: (m, p) pairs that are not looked at.
         """
         sure = np.zeros(len(values), dtype=np.bool_)
         if self._library is not None:
-            self._find(self._library.settle, values, pairs, loose, skipped, sure, padding=padding)
+            others = loose, skipped, sure
+            self._find(self._library.settle, values, pairs, *others, padding=padding)
         return sure
 
     def gaps(self, values: Array, pairs: NDArray[np.intc]) -> NDArray[np.float32]:
@@ -157,14 +159,13 @@ class Certificate:
         values: Array,
         pairs: NDArray[np.intc],
         *others: NDArray[Any],
-        padding: Array | None = None,
+        padding: NDArray[np.float32] | None = None,
     ) -> None:
         """Call compiled code with what follows the values there."""
         plain = np.ascontiguousarray(values[:, self._columns], dtype=np.float32)
         given = [ctypes.byref(self._scene), len(pairs), address(pairs)]
         if padding is not None:
-            apart = (padding + _ROUNDING).astype(np.float32)
-            given.append(address(apart))
+            given.append(address(padding))
         arrays = (plain, np.sin(plain), 1 - np.cos(plain), *others)
         function(*given, len(values), *map(address, arrays))
 

@@ -77,8 +77,8 @@ class KeyframeCertificate:
         }
         deep = [pairs[number] for those in self._held.values() for number in those]
         self._pairs = np.array(pairs + deep, dtype=np.intc)
-        self._padding = np.full(len(self._pairs), _SLACK - MARGIN)
-        self._padding[len(pairs) :] = _SLACK - HAND_DEPTH
+        deepest = np.repeat([MARGIN, HAND_DEPTH], [len(pairs), len(deep)])
+        self._padding = (_SLACK - deepest).astype(np.float32)
 
     def clear(self, moments: Sequence[Moment]) -> list[bool]:
         """In which moments nothing is deeper in something else than it may."""

@@ -1,7 +1,7 @@
 """Verification of keyframes."""
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from itertools import accumulate, pairwise
@@ -25,7 +25,6 @@ from guided_lgp.bounds.verify.certified import certificate_of
 from guided_lgp.bounds.verify.efforts import Load, overloads
 from guided_lgp.bounds.verify.geometry import (
     NOTHING,
-    Stack,
     declared,
     grasp_faults,
     placement_faults,
@@ -37,6 +36,11 @@ from guided_lgp.scene import Scene
 from guided_lgp.scene.world import World, at_side, poses_at_side
 
 LIMIT_TOLERANCE = 1e-6
+
+_Pair = tuple[str, str]
+"""A box and a gripper."""
+_Grip = tuple[list[float], list[float]]
+"""Poses of both."""
 
 
 def verify_keyframe(
@@ -62,29 +66,44 @@ def verify_keyframe(
 
 
 def _faults(
-    world: World, reached: "_Reached", clear: bool, good: Mapping[str, Stack] = NOTHING
+    world: World, reached: "_Reached", clear: bool, last: "_Reached | None" = None
 ) -> list[Violation]:
     """What is violated in a keyframe, of which it may be certain that nothing collides.
 
-    Some stacks have been found good before.
+    What is as it was in the last keyframe has been found good there.
     """
     if not reached.is_finite:
         return [Violation("finite pose", math.nan)]
-    convex, robot, given = (
-        box_bodies(world.scene),
-        world.scene.robot.description,
-        given_grasps(world.scene),
-    )
-    boxes, held, support = reached.boxes, reached.held, reached.support
-    violations = joint_limit_faults(robot, reached.keyframe.q)
-    for box, gripper in held:
-        arm, tool = robot.arms[gripper], reached.tools[gripper]
-        violations += grasp_faults(arm, box, convex[box], boxes[box], tool, given.get(box))
-    reached.stacks = stacks(boxes, support)
+    scene = world.scene
+    violations = joint_limit_faults(scene.robot.description, reached.keyframe.q)
+    violations += _grasp_faults(scene, reached, {} if last is None else last.grips)
+    good = NOTHING if last is None else last.stacks
+    reached.stacks = stacks(reached.boxes, reached.support)
     changed = [box for box, stack in reached.stacks.items() if good.get(box) != stack]
-    violations += placement_faults(world.scene, boxes, support, changed)
-    violations += _effort_faults(world.scene, reached, held, support)
+    if changed:
+        violations += placement_faults(scene, reached.boxes, reached.support, changed)
+    violations += _effort_faults(scene, reached)
     return violations if clear else violations + _collisions(world, reached)
+
+
+def _grasp_faults(
+    scene: Scene, reached: "_Reached", good: Mapping[_Pair, _Grip]
+) -> list[Violation]:
+    """Hands that do not hold their boxes; some grips have been found good before."""
+    reached.grips = {
+        pair: (reached.boxes[pair[0]], reached.tools[pair[1]]) for pair in reached.held
+    }
+    changed = [pair for pair, grip in reached.grips.items() if good.get(pair) != grip]
+    if not changed:
+        return []
+    bodies, given, arms = box_bodies(scene), given_grasps(scene), scene.robot.description.arms
+    return [
+        fault
+        for box, gripper in changed
+        for fault in grasp_faults(
+            arms[gripper], box, bodies[box], *reached.grips[box, gripper], given.get(box)
+        )
+    ]
 
 
 def _collisions(world: World, reached: "_Reached") -> list[Violation]:
@@ -120,30 +139,36 @@ def verify_keyframes(
     Returns:
         The first violation with its action, or None.
     """
-    before = progress(world.scene.state, skeleton[:verified])
-    states = list(accumulate(skeleton[verified:], successor, initial=before))
+    last = _last_before(world.scene, skeleton[:verified], after_action[:verified])
+    states = list(accumulate(skeleton[verified:], successor, initial=last.after))
     frames = [f for pair in zip(at_switch, after_action, strict=True) for f in pair][2 * verified :]
     modes = [(state, after) for before, after in pairwise(states) for state in (before, after)]
     reached = _reached(world.scene, frames, modes)
     clear = certificate_of(world.scene).clear(reached)
-    last = _last_before(world.scene, after_action[:verified], states[0])
     for number, (now, is_clear) in enumerate(zip(reached, clear, strict=True)):
-        found = _faults(world, now, is_clear, last.stacks) or _slips(last, now)
+        found = _faults(world, now, is_clear, last) or _slips(last, now)
         if found:
             return replace(found[0], action=verified + number // 2)
         last = now
         if number % 2:
-            _REACHED[now.keyframe] = now
+            _REACHED[now.keyframe] = skeleton[: verified + number // 2 + 1], now
     return None
 
 
-def _last_before(scene: Scene, after_action: Sequence[Keyframe], state: State) -> "_Reached":
-    """The last keyframe that was checked before, or else the start."""
-    if after_action:
-        last = after_action[-1]
-        return _REACHED.get(last) or _reached(scene, [last], [(state, state)])[0]
-    start = Keyframe(at_side(scene), poses_at_side(scene))
-    return _reached(scene, [start], [(state, state)])[0]
+def _last_before(scene: Scene, skeleton: Skeleton, after_action: Sequence[Keyframe]) -> "_Reached":
+    """The last keyframe that was checked before, after some actions, or else the start."""
+    last = after_action[-1] if after_action else _start(scene)
+    actions, reached = _REACHED.get(last, (None, None))
+    if reached is not None and actions == skeleton:
+        return reached
+    state = progress(scene.state, skeleton)
+    return _reached(scene, [last], [(state, state)])[0]
+
+
+@lru_cache(maxsize=8)
+def _start(scene: Scene) -> Keyframe:
+    """Before the first action."""
+    return Keyframe(at_side(scene), poses_at_side(scene))
 
 
 @lru_cache(maxsize=1024)
@@ -170,17 +195,12 @@ def _limits(robot: Robot) -> list[list[float]]:
     return limits
 
 
-def _effort_faults(
-    scene: Scene,
-    reached: "_Reached",
-    held: Iterable[tuple[str, str]],
-    support: Mapping[str, str],
-) -> list[Violation]:
+def _effort_faults(scene: Scene, reached: "_Reached") -> list[Violation]:
     """Joints whose motor is too weak to rest in a keyframe."""
     loads = (
         Load(gripper, name, np.array(relative(reached.boxes[name], reached.tools[gripper])[0]))
-        for box, gripper in held
-        for name in whole_stack(box, support)
+        for box, gripper in reached.held
+        for name in whole_stack(box, reached.support)
     )
     return overloads(scene, reached.keyframe.q[None], loads)
 
@@ -196,12 +216,12 @@ class _Reached:
         state: State,
         after: State,
     ) -> None:
-        self.keyframe, self.tools, self.state = keyframe, tools, state
+        self.keyframe, self.tools, self.state, self.after = keyframe, tools, state, after
         self.boxes = {name: placement.tolist() for name, placement in keyframe.boxes.items()}
         self.is_finite = math.isfinite(sum(map(sum, self.boxes.values())))
         self.held = tuple(dict.fromkeys((*state.held, *after.held)))
         self.support = dict(state.support) | dict(after.support)
-        self.stacks = NOTHING
+        self.stacks, self.grips = NOTHING, dict[_Pair, _Grip]()
         """Those that have been looked at."""
         robot, bodies = scene.robot.description, box_bodies(scene)
         self.fingers: dict[str, float] = {}
@@ -230,8 +250,8 @@ def _reached(
     ]
 
 
-_REACHED: WeakKeyDictionary[Keyframe, _Reached] = WeakKeyDictionary()
-"""What has been found good after an action and may be gone on from."""
+_REACHED: WeakKeyDictionary[Keyframe, tuple[Skeleton, _Reached]] = WeakKeyDictionary()
+"""What has been found good after some actions and may be gone on from."""
 
 
 def _slips(last: _Reached, reached: _Reached) -> list[Violation]:
