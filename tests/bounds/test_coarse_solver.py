@@ -69,7 +69,6 @@ def test_rows_change_by_no_more_than_their_levers_say() -> None:
     skeleton = parse_skeleton("(grasp pr2L red) (place pr2L red green) (grasp pr2R green)")
     formulation = Formulator(SceneGeometry(scene), Margins()).build(skeleton)
     program, rng = formulation.program, np.random.default_rng(5)
-    starts = np.append(program.input_start, len(program.inputs))
     interpreter, known = Interpreter(load_robot("pr2")), np.isfinite(program.levers)
     assert known.mean() > 0.5
     low, high = program.lower[: program.variables], program.upper[: program.variables]
@@ -80,7 +79,7 @@ def test_rows_change_by_no_more_than_their_levers_say() -> None:
         change = interpreter.residuals(program, moved) - interpreter.residuals(program, values)
         ways = program.levers * np.abs(moved - values)[program.inputs]
         for i in range(program.instances):
-            inputs, rows = (slice(*at[i : i + 2]) for at in (starts, program.row_start))
+            inputs, rows = (slice(*at[i : i + 2]) for at in program.starts[::2])
             if known[inputs].all():
                 assert np.abs(change[rows]).max() <= ways[inputs].sum() + 1e-9
 

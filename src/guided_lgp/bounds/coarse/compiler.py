@@ -111,5 +111,5 @@ def _entry(kernel: Kernel) -> str:
     shared = kernel.shared
     functions = [function.name() for function in kernel.compiled] + ["0"] * (shared is None)
     sizes = (shared.inputs, shared.parameters) if shared else (0, 0)
-    numbers = (kernel.inputs, kernel.rows, int(kernel.equality), *sizes)
+    numbers = (kernel.inputs, kernel.parameters, kernel.rows, int(kernel.equality), *sizes)
     return f"{{{', '.join((*functions, *map(str, numbers)))}}}"

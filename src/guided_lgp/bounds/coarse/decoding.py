@@ -76,7 +76,7 @@ class Decoder:
 
     def failure(self, formulation: Formulation, solution: Solution, slack: float) -> Failure:
         """The constraint that is violated most."""
-        starts = formulation.program.row_start
+        starts = formulation.program.starts[2]
         excess, index, row = -np.inf, 0, 0
         for i, instance in enumerate(formulation.instances):
             values = solution.residuals[starts[i] : starts[i + 1]]

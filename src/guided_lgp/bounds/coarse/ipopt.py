@@ -33,8 +33,9 @@ class Ipopt:
         rows, lower, upper = [], [], []
         for i, number in enumerate(program.kernel):
             kernel = self._table[number]
-            inputs = program.inputs[program.input_start[i] :][: kernel.inputs].tolist()
-            parameters = program.parameters[program.parameter_start[i] :][: kernel.parameters]
+            input_start, parameter_start, _ = program.starts[:, i]
+            inputs = program.inputs[input_start:][: kernel.inputs].tolist()
+            parameters = program.parameters[parameter_start:][: kernel.parameters]
             c = kernel.independent(everything[inputs], ca.SX(parameters))
             rows.append(c)
             lower += [0.0 if kernel.equality else -settings.slack] * c.numel()

@@ -12,24 +12,57 @@ typedef int (*function)(const double **, double **, int *, double *, int);
  * its results are the third argument of the residual. */
 typedef struct {
     function residual, jacobian, shared;
-    int inputs, rows, equality, shared_inputs, shared_parameters;
+    int inputs, parameters, rows, equality, shared_inputs, shared_parameters;
 } kernel_type;
 
 static const kernel_type kernel_table[] = {KERNELS};
 
 typedef struct {
     int variables, instances, rows, kept; /* variables that stay where they are, the first ones */
-    const int *kernel, *input_start, *inputs;
+    const int *kernel, *inputs; /* of the values; constants come after the variables */
     const double *levers; /* how much a row changes at most per unit of each input */
-    const int *parameter_start, *row_start;
     const double *parameters;
     const double *weight, *target, *lower, *upper;
     const int *order; /* order[v]: place of variable v in the factorisation */
+    const int *input_start, *parameter_start, *row_start; /* of each instance; found here */
 } program;
 
 static const kernel_type *kernel_of(const program *nlp, int i)
 {
     return kernel_table + nlp->kernel[i];
+}
+
+/* A number that, if it is negative, says how far it comes after so many others. */
+static int after(int count, int number)
+{
+    return number < 0 ? count - 1 - number : number;
+}
+
+/* Where the inputs, parameters and rows of each instance begin, and everything numbered from 0 on:
+ * Python adds actions to a program, which then has more variables. The result holds all of it. */
+static int *lay_out(program *nlp)
+{
+    int n = nlp->variables, instances = nlp->instances, inputs = 0, alone = 0;
+    for (int i = 0; i < instances; i++)
+        inputs += kernel_of(nlp, i)->inputs;
+    for (int v = 0; v < n; v++)
+        alone += nlp->order[v] >= 0;
+    int *laid = calloc(3 * (instances + 1) + inputs + n, sizeof(int));
+    int *input_start = laid, *parameter_start = input_start + instances + 1;
+    int *row_start = parameter_start + instances + 1, *found = row_start + instances + 1;
+    int *order = found + inputs;
+    for (int i = 0; i < instances; i++) {
+        input_start[i + 1] = input_start[i] + kernel_of(nlp, i)->inputs;
+        parameter_start[i + 1] = parameter_start[i] + kernel_of(nlp, i)->parameters;
+        row_start[i + 1] = row_start[i] + kernel_of(nlp, i)->rows;
+    }
+    for (int j = 0; j < inputs; j++)
+        found[j] = after(n, nlp->inputs[j]);
+    for (int v = 0; v < n; v++)
+        order[v] = after(alone, nlp->order[v]);
+    nlp->input_start = input_start, nlp->parameter_start = parameter_start;
+    nlp->row_start = row_start, nlp->inputs = found, nlp->order = order;
+    return laid;
 }
 
 static void gather(const program *nlp, int i, const double *values, double *x)

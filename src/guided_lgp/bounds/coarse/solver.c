@@ -120,9 +120,12 @@ static void linearise(const program *nlp, int n, const int *place, const double 
 
 /* Values (variables first, then constants) are changed in place, c receives the residuals.
  * Returns the number of steps tried; report: largest violation. */
-int coarse_solve(const program *nlp, const settings *options, double *values, double *c,
+int coarse_solve(const program *given, const settings *options, double *values, double *c,
                  double *report)
 {
+    program laid_out = *given;
+    const program *nlp = &laid_out;
+    int *laid = lay_out(&laid_out);
     int instances = nlp->instances, rows = nlp->rows, tried = 0;
     int *place = malloc(sizeof(int) * 5 * nlp->variables), n = find_places(nlp, place);
     int *used = place + nlp->variables;
@@ -208,6 +211,7 @@ int coarse_solve(const program *nlp, const settings *options, double *values, do
     }
     *report = worst;
     free(doubles);
+    free(laid);
     free(place);
     free(flags);
     free(held);

@@ -78,13 +78,16 @@ class Solver(ClosedForms, Protocol):
         ...
 
 
-_COUNTS, _ARRAYS = ("variables", "instances", "rows"), tuple(f.name for f in fields(Program))
+_COUNTS = ("variables", "instances", "rows")
+_ARRAYS = tuple(field.name for field in fields(Program) if field.name != "sizes")
+_FOUND = ("input_start", "parameter_start", "row_start")
+"""In C."""
 
 
 class _CProgram(ctypes.Structure):
     _fields_ = (
         *((name, ctypes.c_int) for name in (*_COUNTS, "kept")),
-        *((name, ctypes.c_void_p) for name in _ARRAYS),
+        *((name, ctypes.c_void_p) for name in (*_ARRAYS, *_FOUND)),
     )
 
 
@@ -236,9 +239,9 @@ class Interpreter:
 
     def _arguments(self, program: Program, i: int, values: Array) -> tuple[Kernel, Array, Array]:
         kernel = self._table[program.kernel[i]]
-        inputs = program.inputs[program.input_start[i] :][: kernel.inputs]
-        parameters = program.parameters[program.parameter_start[i] :][: kernel.parameters]
-        return kernel, values[inputs], parameters
+        input_start, parameter_start, _ = program.starts[:, i]
+        inputs = program.inputs[input_start:][: kernel.inputs]
+        return kernel, values[inputs], program.parameters[parameter_start:][: kernel.parameters]
 
     def residuals(self, program: Program, values: Array) -> Array:
         """All rows (scaled) at values of the variables and constants."""
@@ -263,11 +266,12 @@ class Interpreter:
         g = program.weight * (values[:n] - program.target)
         H = np.diag(program.weight)
         for i in range(program.instances):
-            rows = slice(int(program.row_start[i]), int(program.row_start[i + 1]))
+            input_start, _, row_start = program.starts[:, i]
+            rows = slice(row_start, program.starts[2, i + 1])
             if not active[rows].any():
                 continue
             kernel, x, p = self._arguments(program, i, values)
-            inputs = program.inputs[program.input_start[i] :][: kernel.inputs]
+            inputs = program.inputs[input_start:][: kernel.inputs]
             variable = inputs < n
             jacobian = np.array(kernel.jacobian(x, p)[1]).T[active[rows]][:, variable]
             g_part = penalty * jacobian.T @ shifted[rows][active[rows]]

@@ -3,6 +3,7 @@
 from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -18,26 +19,25 @@ Integers = NDArray[np.intc]
 class Program:
     """min 1/2 sum w (x - t)^2 over lower <= x <= upper, subject to the rows of kernel instances.
 
-    Instance i is kernel ``kernel[i]`` of the values at ``inputs[input_start[i]:...]`` (indices
-    below the number of variables are variables, the others constants) with the parameters that
-    start at ``parameters[parameter_start[i]]``; its rows start at ``row_start[i]``, and
-    ``row_start`` has one entry more, the number of rows. ``order[v]`` is the place of a variable
-    in the factorisation. The fields are those of the structure in C, in its order.
+    Instance i is kernel ``kernel[i]`` of the values in its slots, with its parameters: both come
+    after those of the instances before it, and so do its rows. A slot that is not negative is that
+    of a variable, -1 that of the first constant. The first fields are those of the structure in C,
+    in its order.
     """
 
     kernel: Integers
-    input_start: Integers
-    inputs: Integers
+    slots: Integers
     levers: Array
     """How much a row changes at most per unit of each input; infinite where that is not known."""
-    parameter_start: Integers
-    row_start: Integers
     parameters: Array
     weight: Array
     target: Array
     lower: Array
     upper: Array
     order: Integers
+    """Place of each variable in the factorisation; negative: of those after all others, from -1."""
+    sizes: Integers
+    """(3, kernels) numbers of inputs, parameters and rows."""
 
     def holding(self, values: Array) -> "Program":
         """With the first variables at values where they stay."""
@@ -56,10 +56,21 @@ class Program:
         """Number of kernel instances."""
         return len(self.kernel)
 
-    @property
+    @cached_property
     def rows(self) -> int:
         """Number of constraints."""
-        return int(self.row_start[-1])
+        return int(self.sizes[2].take(self.kernel).sum())
+
+    @cached_property
+    def inputs(self) -> Integers:
+        """The indices of all slots in the values, variables first, then constants."""
+        return np.where(self.slots < 0, self.variables - 1 - self.slots, self.slots)
+
+    @cached_property
+    def starts(self) -> Integers:
+        """(3, instances + 1) where the inputs, parameters and rows of each instance begin."""
+        first = np.zeros((3, 1), dtype=np.intc)
+        return np.hstack([first, np.cumsum(self.sizes[:, self.kernel], axis=1, dtype=np.intc)])
 
 
 class Instance(NamedTuple):
@@ -113,10 +124,10 @@ class ProgramBuilder:
         self._weight = array("d")
         self._target = array("d")
         self._order = array("i")
-        """Places among the variables of one configuration alone, or (negative) after all these."""
+        """Among the variables of one configuration alone, or (negative) after all these."""
         self._alone = self._shared = 0
         self._kernel = array("i")
-        self._inputs = array("i")
+        self._slots = array("i")
         self._levers = array("d")
         self._parameters = array("d")
 
@@ -175,7 +186,7 @@ class ProgramBuilder:
         """Add an instance of a kernel; see :class:`Instance` and :class:`Program`."""
         number = self.number(kernel)
         self._kernel.append(number)
-        self._inputs.extend(inputs)
+        self._slots.extend(inputs)
         self._parameters.extend(parameters)
         self._levers.extend([np.inf] * len(inputs) if levers is None else levers)
         self.instances.append(Instance(action, number, names, links))
@@ -188,33 +199,22 @@ class ProgramBuilder:
         """Add instances for one configuration of the arm, the slots of its joints."""
         self._kernel.extend(instances.kernel)
         for others in instances.inputs:
-            self._inputs.extend(joints + others)
+            self._slots.extend(joints + others)
         self._parameters.extend(instances.parameters)
         self._levers.extend(instances.levers)
         self.instances.extend(instances.meanings)
 
     def build(self) -> Program:
-        """The program."""
-        kernel = np.array(self._kernel)
-        starts = np.zeros((3, len(kernel) + 1), dtype=np.intc)
-        np.cumsum(self._table.sizes[:, kernel], axis=1, out=starts[:, 1:])
+        """The program, in the memory of this builder: nothing is added to it any more."""
         return Program(
-            kernel=kernel,
-            input_start=starts[0],
-            inputs=_after(self._inputs, len(self._lower)),
-            levers=np.array(self._levers),
-            parameter_start=starts[1],
-            row_start=starts[2],
-            parameters=np.array(self._parameters),
-            weight=np.array(self._weight),
-            target=np.array(self._target),
-            lower=np.array(self._lower),
-            upper=np.array(self._upper),
-            order=_after(self._order, self._alone),
+            kernel=np.frombuffer(self._kernel, np.intc),
+            slots=np.frombuffer(self._slots, np.intc),
+            levers=np.frombuffer(self._levers),
+            parameters=np.frombuffer(self._parameters),
+            weight=np.frombuffer(self._weight),
+            target=np.frombuffer(self._target),
+            lower=np.frombuffer(self._lower),
+            upper=np.frombuffer(self._upper),
+            order=np.frombuffer(self._order, np.intc),
+            sizes=self._table.sizes,
         )
-
-
-def _after(places: "array[int]", count: int) -> Integers:
-    """Places of which negative ones, from -1 on, come after a number of others."""
-    found = np.array(places)
-    return np.where(found < 0, count - 1 - found, found)
