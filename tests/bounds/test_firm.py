@@ -54,12 +54,17 @@ def test_a_grip_that_does_not_hold_is_refused_by_name() -> None:
 def test_the_firmest_is_taken_where_none_holds_firmly(monkeypatch: pytest.MonkeyPatch) -> None:
     loose = motion(firm=False)
     monkeypatch.setattr("guided_lgp.bounds.path.firm.MOST", load(loose))
-    assert firmest(SCENE, iter([loose])) is loose
+    found = firmest(SCENE, iter([loose]))
+    assert found is not None
+    assert found.trajectory is loose.trajectory
 
 
 def test_the_next_motion_is_taken_where_one_does_not_hold() -> None:
     motions = iter([motion(firm=False), motion(firm=True), motion(firm=False)])
-    assert firmest(SCENE, motions) is motion(firm=True)
+    found = firmest(SCENE, motions)
+    assert found is not None
+    assert found.trajectory is motion(firm=True).trajectory
+    assert found.load > 20
     assert len(list(motions)) == 1
 
 

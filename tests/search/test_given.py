@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -56,6 +57,27 @@ def test_of_several_candidates_the_fastest_of_the_shortest_is_taken(
     assert path is not None
     assert path.trajectory is not None
     assert (len(path.skeleton), path.trajectory.times[-1]) == (2, duration)
+
+
+@pytest.mark.parametrize(("seconds", "gripper"), [(1.98, "pr2L"), (1.8, "pr2R")])
+def test_where_durations_are_alike_the_lighter_grip_is_taken(
+    seconds: float, gripper: str, scene: Scene, limits: SearchLimits
+) -> None:
+    class LoadedBounds(TimedBounds):
+        """Quicker by pr2R, which has to press with 50 N."""
+
+        def path(self, skeleton: Skeleton) -> PathResult:
+            found = super().path(skeleton)
+            assert found.trajectory is not None
+            if skeleton[-1].symbols[0] == "pr2L":
+                return found
+            motion = replace(found.trajectory, times=np.array([0.0, seconds]))
+            return replace(found, trajectory=motion, load=50.0)
+
+    problem = Problem(scene, OBJECTIVE, limits, LoadedBounds(scene), UNIFORM, candidates=2)
+    skeleton = best_first.plan(problem).skeleton
+    assert skeleton is not None
+    assert skeleton[-1].symbols[0] == gripper
 
 
 def test_fewer_candidates_than_asked_for_are_enough(scene: Scene, limits: SearchLimits) -> None:

@@ -99,6 +99,8 @@ class PathResult:
     trajectory: Trajectory | None = None
     at_switch: tuple[Keyframe, ...] = ()
     failure: Failure | None = None
+    load: float = 0.0
+    """Of firm bounds: with how many N the fingers would just hold what the motion carries."""
     verification: Mapping[str, object] = field(default_factory=dict)
     """Figures of the check in PyBullet: number of configurations, deepest penetration (m)."""
     steps: "tuple[Step, ...]" = field(default=(), compare=False, repr=False)

@@ -41,6 +41,11 @@ class Grip:
     ratio: float
     """Largest share of the pads' capacity that the load takes, riders included."""
 
+    @property
+    def need(self) -> float:
+        """N from either side that would just hold the load."""
+        return self.ratio * self.force
+
 
 def grips_of(
     scene: Scene, skeleton: Skeleton, switches: Sequence[int], trajectory: Trajectory

@@ -1,6 +1,7 @@
 """Of several motions the one whose grips hold: what stands on a held box pulls at the pads, too."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 from guided_lgp.bounds.execution.forces import MOST, Grip, grips_of
 from guided_lgp.bounds.results import Failure, PathResult
@@ -23,22 +24,25 @@ def firmest(scene: Scene, motions: Iterator[PathResult]) -> PathResult | None:
     """
     best: tuple[Grip, PathResult] | None = None
     for motion in motions:
-        worst = _worst_grip(scene, motion)
-        if worst is None or worst.ratio <= RATIO + _ROUNDING:
+        grips = _chosen_grips(scene, motion)
+        worst = max(grips, key=lambda grip: grip.ratio, default=None)
+        if worst is None:
             return motion
+        loaded = replace(motion, load=max(grip.need for grip in grips))
+        if worst.ratio <= RATIO + _ROUNDING:
+            return loaded
         if best is None or worst.ratio < best[0].ratio:
-            best = worst, motion
+            best = worst, loaded
     if best is None or best[0].ratio <= MOST:
         return best and best[1]
     return _refused(scene, *best)
 
 
-def _worst_grip(scene: Scene, motion: PathResult) -> Grip | None:
-    """The grip with the largest load, of those that the motion chooses."""
+def _chosen_grips(scene: Scene, motion: PathResult) -> list[Grip]:
+    """Those that the motion chooses."""
     assert motion.trajectory is not None
     grips = grips_of(scene, motion.skeleton, _switches(scene, motion), motion.trajectory)
-    chosen = [grip for grip in grips if grip.start > 0]
-    return max(chosen, key=lambda grip: grip.ratio, default=None)
+    return [grip for grip in grips if grip.start > 0]
 
 
 def _refused(scene: Scene, grip: Grip, motion: PathResult) -> PathResult:
