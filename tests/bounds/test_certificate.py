@@ -118,7 +118,7 @@ def test_any_robot(model: str) -> None:
 
 
 def test_without_a_compiler_coal_decides_everything(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "_library", lambda: None)
+    monkeypatch.setattr(module, "_library", lambda lanes: None)
     checker = CollisionChecker(SCENE)
     checker.enter(planning_scenes()[0])
     assert not checker.certified(random_rows(5)).any()

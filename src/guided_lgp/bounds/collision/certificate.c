@@ -1,12 +1,11 @@
 /* Which configurations are surely free of collisions: a sufficient test, many configurations at
  * once. Bodies are convex: an oriented box around each, whose frame hangs on a joint, and vertices
  * in that frame. Two bodies are apart if their spheres are, or if along the axes of one box the
- * other box, or the other's vertices, stay away. Loops over lanes are plain; compilers vectorise, and
- * WIDEST and INLINE are explained in compiled.py.
+ * other box, or the other's vertices, stay away. Loops over lanes, LANES configurations at once, are
+ * plain; compilers vectorise, and WIDEST and INLINE are explained in compiled.py.
  */
 #include <math.h>
 
-#define LANES 16 /* configurations at once */
 #define STEPS 16 /* directions in which two bodies are looked at last */
 
 typedef float lanes[LANES];
@@ -311,12 +310,19 @@ static int split(const scene *s, const pose *poses, int a, int b, int lane, floa
     return 0;
 }
 
-/* Configurations as above, poses (count, loose, 7), and which pairs (count, pairs) of each are not looked at, to
- * sure (count): whether all others are farther apart than their paddings. */
+/* Values (count, joints) in columns, poses (count, loose, 7), and which pairs (count, pairs) are not
+ * looked at, to sure (count): whether all others are farther apart than their paddings. */
 WIDEST void settle(const scene *s, int pairs, const int *pair, const float *padding, int count,
-            const float *value, const float *sine, const float *versine, const double *loose,
+            const int *column, const double *values, const double *loose,
             const unsigned char *skip, unsigned char *sure)
 {
+    float value[count * s->joints], sine[count * s->joints], versine[count * s->joints];
+    for (int row = 0, i = 0; row < count; row++)
+        for (int j = 0; j < s->joints; j++, i++) {
+            value[i] = values[row * s->joints + column[j]];
+            sine[i] = sinf(value[i]);
+            versine[i] = 1 - cosf(value[i]);
+        }
     pose joints[s->joints + s->loose], poses[s->bodies];
     for (int first = 0; first < count; first += LANES) {
         int rows = count - first < LANES ? count - first : LANES, unsure[LANES];
@@ -326,11 +332,11 @@ WIDEST void settle(const scene *s, int pairs, const int *pair, const float *padd
         for (int p = 0; p < pairs; p++) {
             int a = pair[2 * p], b = pair[2 * p + 1], wanted = 0;
             for (int l = 0; l < rows; l++)
-                wanted |= sure[first + l] && !skip[(long)(first + l) * pairs + p];
+                wanted |= sure[first + l] && !skip[(first + l) * pairs + p];
             if (!wanted || !pair_near(s, poses, a, b, padding[p], unsure))
                 continue;
             for (int l = 0; l < rows; l++)
-                if (unsure[l] && sure[first + l] && !skip[(long)(first + l) * pairs + p])
+                if (unsure[l] && sure[first + l] && !skip[(first + l) * pairs + p])
                     sure[first + l] = split(s, poses, a, b, l, padding[p]);
         }
     }

@@ -15,11 +15,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from guided_lgp.bounds.collision.shapes import robot_shapes
 from guided_lgp.bounds.results import Array
 from guided_lgp.compiled import address, load_compiled
 from guided_lgp.robots.kinematics import flat, moving_joints
 from guided_lgp.robots.measures.hulls import shape_vertices
 
+_MANY, _FEW = 16, 4
+"""Configurations at once: of motions, and of keyframes, which come in pairs."""
 _ROUNDING = 1e-5
 """What single precision may be off by (m): more padding than that."""
 
@@ -54,6 +57,7 @@ class Certificate:
 
     def __init__(
         self,
+        urdf: Path,
         model: Any,
         template: Array,
         geometry: Any,
@@ -63,17 +67,21 @@ class Certificate:
         """Prepare a scene.
 
         Args:
-            model: of the robot, by pinocchio.
+            urdf: of the robot.
+            model: of it, by pinocchio.
             template: (nq,) of the model; the joints that do not move stay there.
-            geometry: all bodies, by pinocchio; each hangs on a joint.
+            geometry: all bodies, by pinocchio, those of the robot first; each hangs on a joint.
             moving: the joints of a configuration.
             loose: numbers of the bodies that hang on none, but are where each configuration says.
         """
-        self._library = _library()
+        self._library = _library(_FEW if loose else _MANY)
         numbers = [model.getJointId(name) for name in moving]
-        self._columns = np.argsort(numbers, kind="stable")  # from the root to the tips
+        columns = np.argsort(numbers, kind="stable")  # from the root to the tips
+        self._columns = columns.astype(np.intc)
         parents, joints, self._carriers = moving_joints(model, template, sorted(numbers))
-        bodies = [_boxed(shape_vertices(body.geometry)) for body in geometry.geometryObjects]
+        links = _boxed_links(urdf)
+        others = list(geometry.geometryObjects)[len(links) :]
+        bodies = [*links, *(_boxed(shape_vertices(body.geometry)) for body in others)]
         self._boxes = [body.frame for body in bodies]
         self._joint = np.empty(len(bodies), dtype=np.intc)
         self._frame = np.empty((len(bodies), 12), dtype=np.float32)
@@ -114,7 +122,7 @@ class Certificate:
             return np.ones((len(values), len(pairs)), dtype=np.bool_)
         near = np.zeros((len(values), len(pairs)), dtype=np.bool_)
         apart = np.full(len(pairs), padding + _ROUNDING, dtype=np.float32)
-        self._find(self._library.certify, values, pairs, near, padding=apart)
+        self._find(self._library.certify, near, values, pairs, address(apart))
         return near
 
     def apart(
@@ -130,7 +138,7 @@ class Certificate:
         Searches longer than :meth:`near`, where it has to.
 
         Args:
-            values: see :meth:`near`.
+            values: see :meth:`near`; contiguous.
             pairs: the same.
             padding: (p,) distances (m) that they have at least, in single precision; negative ones
                 let them be so deep in each other.
@@ -139,8 +147,9 @@ class Certificate:
         """
         sure = np.zeros(len(values), dtype=np.bool_)
         if self._library is not None:
-            others = loose, skipped, sure
-            self._find(self._library.settle, values, pairs, *others, padding=padding)
+            arrays: list[NDArray[Any]] = [self._columns, values, loose, skipped, sure]
+            given = ctypes.byref(self._scene), len(pairs), address(pairs), address(padding)
+            self._library.settle(*given, len(values), *map(address, arrays))
         return sure
 
     def gaps(self, values: Array, pairs: NDArray[np.intc]) -> NDArray[np.float32]:
@@ -150,30 +159,34 @@ class Certificate:
         """
         least = np.full((len(values), len(pairs)), -np.inf, dtype=np.float32)
         if self._library is not None:
-            self._find(self._library.gaps, values, pairs, least)
+            self._find(self._library.gaps, least, values, pairs)
         return least - np.float32(_ROUNDING)
 
     def _find(
         self,
         function: Any,
+        found: NDArray[Any],
         values: Array,
         pairs: NDArray[np.intc],
-        *others: NDArray[Any],
-        padding: NDArray[np.float32] | None = None,
+        *options: ctypes.c_void_p,
     ) -> None:
-        """Call compiled code with what follows the values there."""
         plain = np.ascontiguousarray(values[:, self._columns], dtype=np.float32)
-        given = [ctypes.byref(self._scene), len(pairs), address(pairs)]
-        if padding is not None:
-            given.append(address(padding))
-        arrays = (plain, np.sin(plain), 1 - np.cos(plain), *others)
+        arrays = (plain, np.sin(plain), 1 - np.cos(plain), found)
+        given = (ctypes.byref(self._scene), len(pairs), address(pairs), *options)
         function(*given, len(values), *map(address, arrays))
 
 
 @cache
-def _library() -> ctypes.CDLL | None:
+def _library(lanes: int) -> ctypes.CDLL | None:
+    """Compiled for so many configurations at once."""
     source = Path(__file__).with_name("certificate.c").read_text(encoding="utf-8")
-    return load_compiled("certificate", source)
+    return load_compiled("certificate", f"#define LANES {lanes}\n{source}")
+
+
+@cache
+def _boxed_links(urdf: Path) -> tuple[_Body, ...]:
+    """The bodies of a robot, in the order of their shapes."""
+    return tuple(_boxed(shape_vertices(link.shape)) for link in robot_shapes(urdf))
 
 
 def _boxed(vertices: Array) -> _Body:

@@ -105,7 +105,9 @@ class CollisionChecker:
         self._turning = np.array(robot.continuous, dtype=int)
         self._plain = np.delete(np.arange(len(at)), self._turning)
         self._plain_at, self._cosine_at = at[self._plain], at[self._turning]
-        self._certificate = Certificate(self._model, self._template, self._geometry, moving)
+        self._certificate = Certificate(
+            robot.urdf, self._model, self._template, self._geometry, moving
+        )
         self._nearest = Nearest(
             self._model,
             self._geometry,

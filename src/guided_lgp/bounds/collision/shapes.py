@@ -79,13 +79,13 @@ def bodies_of(scene: Scene) -> tuple[Any, Any]:
 
     First the shapes of the links, then what never moves, then the boxes, which are nowhere yet.
     """
-    urdf, base = scene.robot.description.urdf, pin.XYZQUATToSE3(scene.robot.base_pose)
-    model, geometry = pin.buildModelFromUrdf(str(urdf)), pin.GeometryModel()
+    robot, base = scene.robot.description, pin.XYZQUATToSE3(scene.robot.base_pose)
+    model, geometry = robot.kinematics.model.copy(), pin.GeometryModel()
 
     def add(name: str, joint: int, placement: Any, shape: Any) -> None:
         geometry.addGeometryObject(pin.GeometryObject(name, joint, placement, shape))
 
-    for link, joint, pose, shape in robot_shapes(urdf):
+    for link, joint, pose, shape in robot_shapes(robot.urdf):
         add(link, joint, pin.SE3(pose) if joint else base * pin.SE3(pose), shape)
     for joint in range(1, model.njoints):
         if model.parents[joint] == 0:

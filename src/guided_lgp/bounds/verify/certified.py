@@ -57,7 +57,9 @@ class KeyframeCertificate:
         self._boxes = [box.name for box in scene.movable]
         loose = range(len(names) - len(self._boxes), len(names))
         (template,) = robot.kinematics.rows(robot.home[None], scene.robot.fixed_values)
-        self._certificate = Certificate(model, template, geometry, robot.moving_joints, loose)
+        self._certificate = Certificate(
+            robot.urdf, model, template, geometry, robot.moving_joints, loose
+        )
         self._fingers = [
             (gripper, arm.fingers.opened, arm.fingers.ratios.tolist())
             for gripper, arm in robot.arms.items()

@@ -157,18 +157,20 @@ def verify_keyframes(
 
 def _last_before(scene: Scene, skeleton: Skeleton, after_action: Sequence[Keyframe]) -> "_Reached":
     """The last keyframe that was checked before, after some actions, or else the start."""
-    last = after_action[-1] if after_action else _start(scene)
-    actions, reached = _REACHED.get(last, (None, None))
+    if not after_action:
+        return _start(scene)
+    actions, reached = _REACHED.get(after_action[-1], (None, None))
     if reached is not None and actions == skeleton:
         return reached
     state = progress(scene.state, skeleton)
-    return _reached(scene, [last], [(state, state)])[0]
+    return _reached(scene, after_action[-1:], [(state, state)])[0]
 
 
 @lru_cache(maxsize=8)
-def _start(scene: Scene) -> Keyframe:
+def _start(scene: Scene) -> "_Reached":
     """Before the first action."""
-    return Keyframe(at_side(scene), poses_at_side(scene))
+    start = Keyframe(at_side(scene), poses_at_side(scene))
+    return _reached(scene, [start], [(scene.state, scene.state)])[0]
 
 
 @lru_cache(maxsize=1024)
@@ -179,8 +181,10 @@ def _finger_value(fingers: Fingers, width: float, closed: bool) -> float:
 
 def joint_limit_faults(robot: Robot, q: Array) -> list[Violation]:
     """Joints of a configuration (n,) outside their limits."""
-    bounds = zip(_limits(robot), q.tolist(), strict=True)
-    excess = [max(low - value, value - high) for (low, high), value in bounds]
+    bounds = list(zip(*_limits(robot), q.tolist(), strict=True))
+    if all(low <= value <= high for low, high, value in bounds):
+        return []
+    excess = [max(low - value, value - high) for low, high, value in bounds]
     return [
         Violation(f"joint limit {robot.joint_names[index]}", beyond)
         for index, beyond in enumerate(excess)
@@ -190,8 +194,8 @@ def joint_limit_faults(robot: Robot, q: Array) -> list[Violation]:
 
 @lru_cache(maxsize=8)
 def _limits(robot: Robot) -> list[list[float]]:
-    """In plain numbers, which is many times faster for one configuration."""
-    limits: list[list[float]] = robot.position_limits.tolist()
+    """Lowest and highest, in plain numbers, which is many times faster for one configuration."""
+    limits: list[list[float]] = robot.position_limits.T.tolist()
     return limits
 
 
