@@ -15,6 +15,7 @@ from contextlib import redirect_stdout
 from dataclasses import replace
 from functools import cache
 from importlib import import_module
+from inspect import signature
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ import pyarrow.parquet as pq
 
 from guided_lgp.experiments import enumerate_sequences
 from guided_lgp.logic import applicable_actions, successor
+from guided_lgp.logic.objectives import satisfied, two_goal_objectives
 from guided_lgp.params import load_params
 from guided_lgp.paths import SOURCES
 from guided_lgp.scene import generate
@@ -195,6 +197,25 @@ def whole_plan(setup: str, number: int, goals: list[str]) -> dict[str, Any]:
     return {"feasible": result.path is not None, "seconds": time.process_time() - began}
 
 
+def open_goals(setup: str, number: int) -> list[list[str]]:
+    """All pairs of goals that do not hold yet."""
+    scene = scenes(setup)[number]
+    pairs = two_goal_objectives(scene.symbols)
+    return [list(map(str, pair)) for pair in pairs if not satisfied(scene.state, pair)]
+
+
+def best_plan(setup: str, number: int, goals: list[str], candidates: int) -> dict[str, Any]:
+    """How long (s) the motion of a plan takes, the best of some where the version compares them."""
+    planning = import_module("guided_lgp.planning")
+    compares = "candidates" in signature(planning.plan).parameters
+    options = {"candidates": candidates} if compares else {}
+    path = planning.plan(scenes(setup)[number], goals, **options).path
+    return {
+        "feasible": path is not None,
+        "duration_s": None if path is None else float(path.trajectory.times[-1]),
+    }
+
+
 def _shard(scene: Any, folder: Path) -> Path:
     """The tables of one configuration, as the stage writes them."""
     given: dict[str, Any] = {
@@ -265,6 +286,8 @@ REQUESTS: dict[str, Callable[..., Any]] = {
     "step": step,
     "logic_tree": logic_tree,
     "plan": whole_plan,
+    "open_goals": open_goals,
+    "best": best_plan,
 }
 
 if __name__ == "__main__":

@@ -1,10 +1,15 @@
-"""The same actions by other hands: who takes which body is a choice that a search makes early."""
+"""The same actions by other hands, or at other places: choices that a search makes early."""
 
+import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import islice, pairwise, product
 
+from guided_lgp.bounds.deadline import OutOfTimeError
+from guided_lgp.bounds.results import PathResult
+from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.logic import (
     Action,
     Skeleton,
@@ -16,7 +21,7 @@ from guided_lgp.logic import (
     successor,
 )
 from guided_lgp.search.problem import Problem
-from guided_lgp.search.result import Run, SearchResult, joined
+from guided_lgp.search.result import Run, SearchResult, cost, joined
 
 _MOST = 4096
 """Choices of hands that are looked through at most; where there are more, none is made."""
@@ -31,6 +36,24 @@ class _Hold:
     gripper: str
     first: int
     last: int
+
+
+def faster(problem: Problem, found: SearchResult, candidates: int, by_hands: int) -> SearchResult:
+    """The plan that a search has found, or a faster one of the same actions.
+
+    Args:
+        problem: what it is a plan for.
+        found: a result with a plan.
+        candidates: how many plans to compare at most; those that the search has found count.
+        by_hands: how many of these by other hands; the rest is at other places.
+    """
+    again = 0
+    if by_hands:
+        found, again = faster_by_other_hands(problem, found, by_hands), 1
+    assert found.coarse is not None
+    assert isinstance(problem.parts, SceneBounds)
+    rest = max(candidates + again - found.path_calls, 0)
+    return faster_at_other_places(found, problem.parts.other_paths(found.coarse.skeleton, rest))
 
 
 def faster_by_other_hands(problem: Problem, found: SearchResult, count: int) -> SearchResult:
@@ -52,6 +75,23 @@ def faster_by_other_hands(problem: Problem, found: SearchResult, count: int) -> 
             break
         run.solve(skeleton)
     return joined(found, run.result(0))
+
+
+def faster_at_other_places(found: SearchResult, paths: Iterator[PathResult]) -> SearchResult:
+    """The plan that a search has found, or the fastest of its actions at other places.
+
+    Args:
+        found: a result with a plan.
+        paths: further motions of it, at other places and by other grips.
+    """
+    assert found.path is not None
+    began, best = time.perf_counter(), found.path
+    with suppress(OutOfTimeError):
+        for path in paths:
+            best = min(best, path, key=cost)
+    spent = time.perf_counter() - began
+    times = replace(found.times, path=found.times.path + spent)
+    return replace(found, path=best, times=times)
 
 
 def with_other_hands(skeleton: Skeleton, state: State, symbols: Symbols) -> Iterator[Skeleton]:

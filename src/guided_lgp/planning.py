@@ -16,7 +16,7 @@ from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.domains import load_domain
 from guided_lgp.errors import InputError
 from guided_lgp.explanation import ObservedBounds, Obstacle, users_bounds
-from guided_lgp.hands import faster_by_other_hands
+from guided_lgp.hands import faster
 from guided_lgp.logic import (
     Goal,
     Objective,
@@ -152,8 +152,8 @@ def plan(
             names none, the paper's, or one that extends it if facts show that a goal needs it.
         skeleton: actions with which the plan begins, also as text; or a file with them: a plan, or
             one action a line. If the goals hold after them, or there are none, they are the plan.
-        candidates: of so many plans at most the shortest, of several the fastest, is the result; if
-            all arms may move at once, three of four are the same actions by other hands.
+        candidates: of so many plans at most the shortest, of several the fastest, is the result; up
+            to three of four are the same actions by other hands, and the rest at other places.
         coordinate: whether all arms move at once where they can, with limited jerk and no way home
             that is not needed; actions of two arms may then change places, unless they are given.
             Otherwise one arm moves at a time.
@@ -229,8 +229,8 @@ def plan(
     if result.unexplained and not deadline.passed:
         found = joined(found, search.plan(attempts.patient(params.bounds)))
         result = attempts.result(found)
-    if result.solved and by_hands:
-        result = attempts.result(faster_by_other_hands(attempts.last, found, by_hands))
+    if result.solved and candidates > 1:
+        result = attempts.result(faster(attempts.last, found, candidates, by_hands))
     return result
 
 

@@ -5,7 +5,7 @@ import pytest
 from scripted import UNIFORM, ScriptedBounds
 
 from guided_lgp.bounds.results import PathResult, Trajectory
-from guided_lgp.hands import faster_by_other_hands, with_other_hands
+from guided_lgp.hands import faster_at_other_places, faster_by_other_hands, with_other_hands
 from guided_lgp.logic import Skeleton, format_skeleton, parse_objective, parse_skeleton
 from guided_lgp.params import SearchLimits
 from guided_lgp.scene.model import Scene
@@ -58,3 +58,11 @@ def test_the_fastest_is_taken(
     assert best.path.trajectory is not None
     assert best.path.trajectory.times[-1] == duration
     assert best.coarse_calls > found.coarse_calls
+
+
+def test_the_fastest_motion_at_other_places_is_taken(scene: Scene, limits: SearchLimits) -> None:
+    bounds = SoonerByTurns(scene)
+    found = best_first.plan(Problem(scene, OBJECTIVE, limits, bounds, UNIFORM))
+    slower, sooner = (bounds.path(parse_skeleton(actions)) for actions in (LEFT, TURNS))
+    assert faster_at_other_places(found, iter([slower])).path is found.path
+    assert faster_at_other_places(found, iter([slower, sooner])).path is sooner

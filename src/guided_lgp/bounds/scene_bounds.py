@@ -1,5 +1,6 @@
 """Both bounds of the NLP for one scene, each verdict computed once."""
 
+from collections.abc import Iterator
 from functools import cached_property
 
 from guided_lgp.bounds.coarse import CoarseBound
@@ -109,6 +110,15 @@ class SceneBounds:
                 result = PathResult(skeleton, feasible=False, failure=coarse.failure)
             self._path[skeleton] = result
         return result
+
+    def other_paths(self, skeleton: Skeleton, count: int) -> Iterator[PathResult]:
+        """Further verified motions for a skeleton that has one: other places, other grips.
+
+        Args:
+            skeleton: the actions.
+            count: how many further coarse solutions to look at.
+        """
+        yield from self._path_bound.others(skeleton, count)
 
     def rest(self) -> PathResult:
         """The motion of a plan without actions."""

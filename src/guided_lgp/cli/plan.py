@@ -101,8 +101,9 @@ def plan(
         typer.Option(
             min=1,
             metavar="N",
-            help="Look for up to N plans, also of the same actions by other hands, and take the "
-            "one of the fewest actions, of several the fastest; of those alike the lighter grip.",
+            help="Look for up to N plans, also of the same actions by other hands or at other "
+            "places, and take the one of the fewest actions, of several the fastest; of those "
+            "alike the lighter grip.",
         ),
     ] = 1,
     one_at_a_time: Annotated[

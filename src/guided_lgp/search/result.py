@@ -225,7 +225,7 @@ class Run:
     @property
     def solution(self) -> tuple[CoarseResult, PathResult] | None:
         """The plan of the fewest actions found, of several the one of the least cost."""
-        return min(self._found.values(), key=lambda found: _cost(found[1]), default=None)
+        return min(self._found.values(), key=lambda found: cost(found[1]), default=None)
 
     def _in_time(self, bound: Callable[[Skeleton], Verdict], otherwise: Verdict) -> Verdict:
         """The verdict of a bound, or another one where the time is up."""
@@ -312,7 +312,7 @@ _LIGHTER = 0.001
 to a twentieth for half of what the fingers of a PR2 can."""
 
 
-def _cost(path: PathResult) -> tuple[int, float]:
+def cost(path: PathResult) -> tuple[int, float]:
     """Actions, and duration (s) where the path has one, longer where grips are loaded more."""
     duration = 0.0 if path.trajectory is None else float(path.trajectory.times[-1])
     return len(path.skeleton), duration * (1 + _LIGHTER * path.load)

@@ -1,7 +1,7 @@
 """The path bound P(a_1:K): the dense motion for a whole skeleton (paper, eq. 4)."""
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import chain, islice
@@ -10,7 +10,7 @@ from guided_lgp.bounds.coarse import CoarseBound
 from guided_lgp.bounds.deadline import NEVER, Deadline, OutOfTimeError
 from guided_lgp.bounds.goals import NO_TERMS, GoalTerms
 from guided_lgp.bounds.path.assembly import FASTEST, Clock, assemble, stay
-from guided_lgp.bounds.path.firm import firmest
+from guided_lgp.bounds.path.firm import firm_ones, firmest
 from guided_lgp.bounds.path.grips import grips_of
 from guided_lgp.bounds.path.motions import Mover
 from guided_lgp.bounds.path.optimise import optimise
@@ -97,19 +97,26 @@ class PathBound:
         """
         began = time.perf_counter()
         furthest = FurthestFailure()
-        motions = self._motions(coarse_result, furthest)
-        found = firmest(self._scene, motions) if self._firm else next(motions, None)
-        if found is None:
-            found = _failed(coarse_result.skeleton, furthest)
-        return replace(found, time_s=time.perf_counter() - began)
-
-    def _motions(
-        self, coarse_result: CoarseResult, furthest: FurthestFailure
-    ) -> Iterator[PathResult]:
-        """Verified motions, one from each coarse solution that has one."""
         skeleton = coarse_result.skeleton
         others = self._coarse.solutions(skeleton, self._solutions)
-        for number, solution in enumerate(islice(chain([coarse_result], others), self._solutions)):
+        solutions = islice(chain([coarse_result], others), self._solutions)
+        motions = self._motions(skeleton, solutions, furthest)
+        found = firmest(self._scene, motions) if self._firm else next(motions, None)
+        if found is None:
+            found = _failed(skeleton, furthest)
+        return replace(found, time_s=time.perf_counter() - began)
+
+    def others(self, skeleton: Skeleton, count: int) -> Iterator[PathResult]:
+        """Further motions, from up to so many further coarse solutions, whose grips hold firmly."""
+        solutions = self._coarse.solutions(skeleton, count)
+        motions = self._motions(skeleton, solutions, FurthestFailure())
+        return firm_ones(self._scene, motions) if self._firm else motions
+
+    def _motions(
+        self, skeleton: Skeleton, solutions: Iterable[CoarseResult], furthest: FurthestFailure
+    ) -> Iterator[PathResult]:
+        """Verified motions, one from each coarse solution that has one."""
+        for number, solution in enumerate(solutions):
             furthest.tried = number + 1
             task = Task(
                 self._scene,

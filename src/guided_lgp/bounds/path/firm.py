@@ -1,6 +1,6 @@
 """Of several motions the one whose grips hold: what stands on a held box pulls at the pads, too."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 from guided_lgp.bounds.execution.forces import MOST, Grip, grips_of
@@ -24,12 +24,8 @@ def firmest(scene: Scene, motions: Iterator[PathResult]) -> PathResult | None:
     """
     best: tuple[Grip, PathResult] | None = None
     for motion in motions:
-        grips = _chosen_grips(scene, motion)
-        worst = max(grips, key=lambda grip: grip.ratio, default=None)
-        if worst is None:
-            return motion
-        loaded = replace(motion, load=max(grip.need for grip in grips))
-        if worst.ratio <= RATIO + _ROUNDING:
+        worst, loaded = _loaded(scene, motion)
+        if worst is None or _is_firm(worst):
             return loaded
         if best is None or worst.ratio < best[0].ratio:
             best = worst, loaded
@@ -38,11 +34,26 @@ def firmest(scene: Scene, motions: Iterator[PathResult]) -> PathResult | None:
     return _refused(scene, *best)
 
 
-def _chosen_grips(scene: Scene, motion: PathResult) -> list[Grip]:
-    """Those that the motion chooses."""
+def firm_ones(scene: Scene, motions: Iterable[PathResult]) -> Iterator[PathResult]:
+    """Those motions whose grips all hold firmly."""
+    for motion in motions:
+        worst, loaded = _loaded(scene, motion)
+        if worst is None or _is_firm(worst):
+            yield loaded
+
+
+def _is_firm(grip: Grip) -> bool:
+    return grip.ratio <= RATIO + _ROUNDING
+
+
+def _loaded(scene: Scene, motion: PathResult) -> tuple[Grip | None, PathResult]:
+    """The worst of the grips that a motion chooses, if any, and the motion with their load."""
     assert motion.trajectory is not None
     grips = grips_of(scene, motion.skeleton, _switches(scene, motion), motion.trajectory)
-    return [grip for grip in grips if grip.start > 0]
+    chosen = [grip for grip in grips if grip.start > 0]
+    load = max((grip.need for grip in chosen), default=motion.load)
+    worst = max(chosen, key=lambda grip: grip.ratio, default=None)
+    return worst, replace(motion, load=load)
 
 
 def _refused(scene: Scene, grip: Grip, motion: PathResult) -> PathResult:
