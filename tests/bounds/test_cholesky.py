@@ -16,7 +16,8 @@ int solve(int n, int *first, int *end, double *H, const double *g, const char *h
           double damping, double *L, double *panel, int *used, double *d)
 {
     skyline shape = {first, end};
-    return step(n, &shape, H, g, held, damping, L, panel, used, d);
+    hold(n, &shape, H, held);
+    return step(n, &shape, H, g, held, damping, L, (lanes *)panel, used, d);
 }
 """
 _PLAIN = "#define WIDEST\n#define INLINE inline\n"

@@ -169,11 +169,12 @@ int coarse_solve(const program *given, const settings *options, double *values, 
                     held[place[v]] = (values[v] <= nlp->lower[v] && g[place[v]] > 0) ||
                                      (values[v] >= nlp->upper[v] && g[place[v]] < 0);
             }
+            hold(n, &shape, H, held);
             int accepted = 0;
             double gain = 0;
             while (!accepted && tried < options->steps) {
                 tried++;
-                if (step(n, &shape, H, g, held, damping, L, panel, used, d)) {
+                if (step(n, &shape, H, g, held, damping, L, (lanes *)panel, used, d)) {
                     for (int v = nlp->kept; v < nlp->variables; v++) {
                         double way = place[v] < 0 ? 0 : d[place[v]];
                         values[v] = fmin(fmax(old[v] + way, nlp->lower[v]), nlp->upper[v]);
