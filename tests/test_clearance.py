@@ -8,7 +8,9 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent / "bounds"))
 from motions import CLOSED, PR2, Motion, from_above, reach, scene, shifted
 
+from guided_lgp import plan
 from guided_lgp.clearance import clearance_of
+from guided_lgp.errors import InputError
 from guided_lgp.logic import parse_skeleton
 
 SCENE = scene(red=(0.52, 0.30, 0.65, 0.2, "tab1"), green=(0.52, -0.30, 0.65, 0.1, "tab2"))
@@ -36,6 +38,12 @@ def test_a_box_keeps_no_distance_from_its_table_as_it_is_lifted() -> None:
     found = clearance_of(SCENE, BOTH, both_grasped(0.10).trajectory())
     assert found.distance > 0.005
     assert (found.part, found.body) != ("red", "tab1")
+
+
+@pytest.mark.parametrize("wished", [0.0, 0.002, 0.06, float("nan")])
+def test_a_clearance_that_cannot_be_wished_is_refused(wished: float) -> None:
+    with pytest.raises(InputError, match=r"clearance: .* out of range \(accepted: 0.003 to 0.05\)"):
+        plan(SCENE, "(held red)", clearance=wished)
 
 
 def test_a_box_that_comes_back_to_its_table_is_near_it() -> None:

@@ -16,6 +16,7 @@ from typer.main import get_command
 from guided_lgp import __version__, cache, cli, doctor
 from guided_lgp.bounds.plan_file import read_plan
 from guided_lgp.bounds.verify import verify_path
+from guided_lgp.clearance import CLEARANCE
 from guided_lgp.errors import InputError, WorkerError, pybullet_remedy
 from guided_lgp.scene.world import world_of
 
@@ -168,6 +169,7 @@ def test_faulty_scenes_name_file_and_field(
 
 
 def test_output_in_a_missing_folder(capsys: pytest.CaptureFixture[str]) -> None:
+    assert "accepted: 0.003 to 0.05" in rejected(capsys, *PLAN, "--clearance", "10")
     assert "folder does not exist" in rejected(capsys, *PLAN, "--out", "nowhere/plan.json")
 
 
@@ -296,6 +298,8 @@ def test_plan_writes_actions_and_a_replay(
     assert plan["objective"] == ["(on red green)"]
     assert plan["physics"]["success"] is True
     assert {"tree_size", "attempts", "time_s"} <= set(plan["statistics"])
+    assert plan["statistics"]["clearance"]["wished"] == CLEARANCE
+    assert {"distance", "part", "body", "time"} < set(plan["statistics"]["clearance"])
 
 
 def test_a_plan_goes_to_standard_output_alone() -> None:

@@ -186,7 +186,9 @@ def test_commands_go_on_and_carry_out(
     _run("plan", str(EXAMPLES / "three_boxes.json"), "--goal", GOALS[0], "--out", str(written))
     state.write_text(_as_it_is(course.scene).model_dump_json())
     _run("replan", str(written), "--observed", str(state), "--out", str(rest))
-    assert "the rest of the plan: kept" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "the rest of the plan: kept" in printed
+    assert printed.count("smallest distance:") == 2
     _run("execute", str(rest))
     printed = capsys.readouterr().out
     assert "physics: all goals hold" in printed

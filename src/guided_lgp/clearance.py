@@ -6,16 +6,26 @@ from itertools import pairwise
 
 import numpy as np
 
+from guided_lgp.bounds.collision import PADDING
 from guided_lgp.bounds.results import Array, Trajectory
 from guided_lgp.bounds.verify.attachments import switches_of
-from guided_lgp.bounds.verify.phase import Phase
+from guided_lgp.bounds.verify.phase import STEP, Phase
 from guided_lgp.bounds.verify.touching import touches
+from guided_lgp.errors import InputError
 from guided_lgp.logic import Skeleton, State, successor
 from guided_lgp.scene import Scene
 from guided_lgp.scene.world import World, initial_poses, world_of
 
+CLEARANCE = 0.01
+"""m that a user's plan keeps from what it does not touch, unless another distance is wished."""
+WIDEST = 0.05
+"""Largest clearance (m) that may be wished: boxes are seldom farther apart."""
 FARTHEST = 0.1
 """m: nobody asks for more."""
+_SIGHT = 0.3
+"""m up to which distances are measured: the farther off a body is, the longer it can be ignored."""
+_APPROACH = 2 * STEP
+"""m by which two bodies come nearer to each other from one sample to the next, at most."""
 _RESTING = 0.03
 """m of the hand's way up to which a box keeps no distance from what it stood on, or will stand on:
 as long as a straight way up."""
@@ -39,6 +49,13 @@ class Clearance:
             return f"more than {1000 * self.distance:.0f} mm"
         place = f"{self.part} to {self.body} at {self.time:.1f} s"
         return f"{1000 * self.distance:.1f} mm, {place}"
+
+
+def check_clearance(clearance: float) -> None:
+    """Require a clearance that may be wished."""
+    if not PADDING <= clearance <= WIDEST:
+        accepted = f"{PADDING:g} to {WIDEST:g}"
+        raise InputError("clearance", f"{clearance:g} m is out of range", accepted)
 
 
 def clearance_of(scene: Scene, skeleton: Skeleton, trajectory: Trajectory) -> Clearance:
@@ -109,7 +126,7 @@ def _nearest_of(
     nearest: Clearance,
 ) -> Clearance:
     """The smallest clearance of a phase, if it is smaller than that of those before it."""
-    robot = world.scene.robot.description
+    robot, due = world.scene.robot.description, dict[tuple[str, str], int]()
     for sample in range(len(phase.q)):
         boxes = phase.boxes_at(sample)
         fingers = robot.finger_values(phase.q[sample])
@@ -117,9 +134,12 @@ def _nearest_of(
         time = float(phase.times[sample])
         resting = {(r.box, r.body) for r in rests if r.start <= time <= r.end}
         for part, body in _pairs(world, phase, touched[sample], resting):
-            distance = world.distance(part, body, nearest.distance)
+            if due.get((part, body), 0) > sample:
+                continue
+            distance = world.distance(part, body, _SIGHT)
             if distance < nearest.distance:
                 nearest = Clearance(distance, part, body, time)
+            due[part, body] = sample + 1 + int((distance - nearest.distance) / _APPROACH)
     return nearest
 
 

@@ -10,6 +10,7 @@ from guided_lgp.bounds.deadline import Deadline
 from guided_lgp.bounds.goals import GoalTerms
 from guided_lgp.bounds.results import CoarseResult, Failure, PathResult
 from guided_lgp.bounds.scene_bounds import SceneBounds
+from guided_lgp.clearance import CLEARANCE
 from guided_lgp.logic import Action, Objective, Skeleton, State, format_skeleton, progress
 from guided_lgp.params import BoundsParams
 from guided_lgp.scene import Scene
@@ -64,6 +65,7 @@ def users_bounds(
     objective: Objective,
     coordinate: bool = False,
     in_order: bool = False,
+    clearance: float = CLEARANCE,
 ) -> SceneBounds:
     """Bounds for a user's plan: jerk is limited, and grips hold firmly, where the scene does not
     give the grasps.
@@ -75,11 +77,13 @@ def users_bounds(
         objective: whose terms motions keep.
         coordinate: whether all arms move at once where they can ...
         in_order: ... and no two actions may change places.
+        clearance: m that motions keep from what they do not touch, where there is room.
     """
     firm = not any(box.grasps for box in scene.movable)
     goals = GoalTerms.of(objective, scene.symbols.domain)
-    shorten = Coordinator(scene, deadline, goals, in_order).shorten if coordinate else None
-    return SceneBounds(scene, params, deadline, objective, firm, shorten, SMOOTH)
+    coordinator = Coordinator(scene, deadline, goals, in_order, clearance)
+    shorten = coordinator.shorten if coordinate else None
+    return SceneBounds(scene, params, deadline, objective, firm, shorten, SMOOTH, clearance)
 
 
 class ObservedBounds:

@@ -1,11 +1,10 @@
 """Plan one task: the Python interface behind ``guided-lgp plan``."""
 
 import logging
-import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 
 from guided_lgp.bounds.deadline import Deadline, OutOfTimeError
@@ -13,21 +12,22 @@ from guided_lgp.bounds.goals import GoalTerms
 from guided_lgp.bounds.path.assembly import stay
 from guided_lgp.bounds.results import PathResult
 from guided_lgp.bounds.scene_bounds import SceneBounds
+from guided_lgp.clearance import CLEARANCE, Clearance, check_clearance, clearance_of
 from guided_lgp.domains import load_domain
 from guided_lgp.errors import InputError
 from guided_lgp.explanation import ObservedBounds, Obstacle, users_bounds
 from guided_lgp.hands import faster
+from guided_lgp.limits import limits_for
 from guided_lgp.logic import (
     Goal,
     Objective,
     Skeleton,
-    least_actions,
     parse_objective,
     progress,
     satisfied,
 )
-from guided_lgp.logic.objectives import asks_for_places, check_objective
-from guided_lgp.params import BoundsParams, PlanningParams, SearchLimits, load_planning
+from guided_lgp.logic.objectives import check_objective
+from guided_lgp.params import BoundsParams, PlanningParams, load_planning
 from guided_lgp.paths import MODELS
 from guided_lgp.policy.registry import (
     DEFAULT_POLICY,
@@ -55,10 +55,6 @@ from guided_lgp.search.policy import Policy
 from guided_lgp.search.problem import Problem
 from guided_lgp.search.result import REASONS, Cause, Run, SearchResult, Times, joined
 from guided_lgp.search.ways import widened_scene
-
-SEQUENCES_PER_ACTION = 100
-"""Sequences that a search may hand to the coarse bound, beyond the limit of the experiments, for
-each action that a task needs at least."""
 
 PATIENCE = 3
 """How many times as many starts a second search has where no fact says why there is no plan."""
@@ -89,6 +85,13 @@ class PlanningResult(SearchResult):
     """Without a plan: what stopped the sequences, first what is nearest to the objective."""
     finding: Finding | None = None
     """Without a plan: why, as far as facts tell, and what would help."""
+
+    @cached_property
+    def clearance(self) -> Clearance | None:
+        """Where its motion comes nearest to what it does not touch; None without a motion."""
+        if self.path is None or self.path.trajectory is None:
+            return None
+        return clearance_of(self.scene, self.path.skeleton, self.path.trajectory)
 
     @property
     def unexplained(self) -> bool:
@@ -132,6 +135,7 @@ def plan(
     skeleton: str | Skeleton = (),
     candidates: int = 1,
     coordinate: bool = True,
+    clearance: float = CLEARANCE,
     where: str = "scene",
 ) -> PlanningResult:
     """Find a sequence of actions and its motion such that all goals hold at the end.
@@ -157,6 +161,8 @@ def plan(
         coordinate: whether all arms move at once where they can, with limited jerk and no way home
             that is not needed; actions of two arms may then change places, unless they are given.
             Otherwise one arm moves at a time.
+        clearance: m that arms, hands and what they carry keep on their way from what they do not
+            touch, where there is room; from 0.003, which all motions keep, to 0.05.
         where: the scene's file, for messages.
 
     Returns:
@@ -171,6 +177,7 @@ def plan(
         raise InputError("planner", f"unknown {planner!r}", ", ".join(SEARCHES))
     if not isinstance(scene, Scene):
         scene, where = load_scene(scene), str(scene)
+    check_clearance(clearance)
     chosen = domain is not None or "domain" in scene.model_fields_set
     if domain is not None:
         scene = scene.model_copy(update={"domain": load_domain(domain).name})
@@ -197,6 +204,7 @@ def plan(
         objective=goals,
         coordinate=coordinate,
         in_order=bool(prefix),
+        clearance=clearance,
     )
     scene_bounds = bounds_of(scene, params.bounds)
     if finding := TaskFacts(scene_bounds, goals, misplaced).before_search():
@@ -206,7 +214,7 @@ def plan(
     problem = Problem(
         scene,
         goals,
-        _limits(params.compare_scalability, scene, goals, prefix, max_nodes),
+        limits_for(params.compare_scalability, scene, goals, prefix, max_nodes),
         _observing(scene_bounds),
         followed,
         parts=scene_bounds,
@@ -352,26 +360,6 @@ def _misplaced(scene: Scene, goals: Objective) -> dict[str, frozenset[str]]:
     faults = terms.faults(scene, initial_poses(scene))
     bodies = sorted({fault.constraint.split()[1] for fault in faults})
     return {body: in_the_way(body, goals, scene) for body in bodies}
-
-
-def _limits(
-    limits: SearchLimits,
-    scene: Scene,
-    goals: Objective,
-    prefix: Skeleton,
-    max_nodes: int | None,
-) -> SearchLimits:
-    """Limits that follow the task: those of the experiments, or more where it needs more."""
-    state = progress(scene.state, prefix)
-    lower_bound = least_actions(state, goals, scene.symbols)
-    least = 0 if math.isinf(lower_bound) else int(lower_bound)
-    least = max(least, 2) if asks_for_places(goals, scene.symbols) else least
-    changed = {
-        "max_depth": max(limits.max_depth, len(prefix) + 2 * least),
-        "max_sequences": limits.max_sequences + SEQUENCES_PER_ACTION * least,
-        "max_tree_size": max_nodes or limits.max_tree_size,
-    }
-    return limits.model_copy(update=changed)
 
 
 def _without_search(

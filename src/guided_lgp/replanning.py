@@ -11,7 +11,7 @@ A laboratory's own perception and control go around it like this::
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from itertools import accumulate, islice
 from typing import Literal
 
@@ -27,6 +27,7 @@ from guided_lgp.bounds.plan_file import Plan
 from guided_lgp.bounds.results import PathResult, Trajectory
 from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.bounds.verify.attachments import switches_of
+from guided_lgp.clearance import CLEARANCE, Clearance, check_clearance, clearance_of
 from guided_lgp.errors import InputError
 from guided_lgp.logic import (
     Goal,
@@ -93,6 +94,13 @@ class Replanned:
     explanation: str = ""
     """Why there is no motion."""
 
+    @cached_property
+    def clearance(self) -> Clearance | None:
+        """Where its motion comes nearest to what it does not touch; None without a motion."""
+        if self.path is None or self.path.trajectory is None:
+            return None
+        return clearance_of(self.scene, self.path.skeleton, self.path.trajectory)
+
     @property
     def course(self) -> Course:
         """The plan from here on.
@@ -111,6 +119,7 @@ def replan(
     observed: Observed,
     *,
     params: PlanningParams | None = None,
+    clearance: float = CLEARANCE,
     timeout: float | None = None,
     where: str = "observed",
 ) -> Replanned:
@@ -121,6 +130,7 @@ def replan(
         after: how many of its actions have been carried out.
         observed: what is seen now.
         params: limits of planning; the shipped ones by default.
+        clearance: m that motions keep from what they do not touch, where there is room.
         timeout: seconds of wall clock for each planning.
         where: the file of what is observed, for messages.
 
@@ -130,19 +140,27 @@ def replan(
     if not 0 <= after <= len(course.skeleton):
         accepted = f"0 to {len(course.skeleton)}"
         raise InputError("after", f"{after} is out of range", accepted)
+    check_clearance(clearance)
     scene = observed_scene(course.scene, observed, where)
     _require_boxes(course, scene, where)
     validate_scene(scene, where)
     goals, rest = course.objective, course.skeleton[after:]
     params = params or load_planning()
-    bounds = partial(SceneBounds, scene, params.bounds, Deadline.after(timeout), firm=True)
+    deadline = Deadline.after(timeout)
+    bounds = partial(SceneBounds, scene, params.bounds, deadline, firm=True, clearance=clearance)
     for way in islice(_ways(scene.state, rest, goals, scene.symbols), TRIED):
         for more in dict.fromkeys((in_the_middle(scene, way), ())):
             path = bounds((*goals, *more)).path(way) if way else stay(scene)
             if path.feasible:
                 return Replanned("kept" if way == rest else "repaired", path, scene, goals)
     found = search(
-        scene, list(map(str, goals)), params=params, timeout=timeout, where=where, coordinate=False
+        scene,
+        list(map(str, goals)),
+        params=params,
+        timeout=timeout,
+        where=where,
+        coordinate=False,
+        clearance=clearance,
     )
     return Replanned("planned anew", found.path, found.scene, goals, found.explanation)
 

@@ -5,25 +5,33 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from motions import reach
 
 from guided_lgp import plan
 from guided_lgp.bounds.checks import box_sizes
+from guided_lgp.bounds.collision import PADDING
 from guided_lgp.bounds.coordination import Coordinator, coordinate
 from guided_lgp.bounds.coordination.itinerary import Itinerary, Stop, itinerary
 from guided_lgp.bounds.coordination.law import TICK, jerk_limited, ramp
+from guided_lgp.bounds.coordination.moments import Moments
+from guided_lgp.bounds.coordination.roads import Edge, Road
+from guided_lgp.bounds.coordination.schedule import schedule
+from guided_lgp.bounds.coordination.timetable import Timetable
 from guided_lgp.bounds.coordination.turns import best_turns
 from guided_lgp.bounds.deadline import NEVER
 from guided_lgp.bounds.execution import execute
+from guided_lgp.bounds.path.motions import Mover
 from guided_lgp.bounds.path.situation import situation_at_start
 from guided_lgp.bounds.results import PathResult, Trajectory
 from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.bounds.verify import verify_path
 from guided_lgp.bounds.verify.attachments import switches_of
 from guided_lgp.bounds.verify.joints import rows_outside_limits
-from guided_lgp.clearance import clearance_of
+from guided_lgp.clearance import CLEARANCE, clearance_of
 from guided_lgp.explanation import users_bounds
 from guided_lgp.logic import format_skeleton, parse_skeleton
 from guided_lgp.params import load_planning
+from guided_lgp.poses import pose
 from guided_lgp.robots import PlacedArm, load_robot
 from guided_lgp.scene import Scene, load_scene
 from guided_lgp.scene.generate import generate
@@ -33,6 +41,16 @@ PR2 = load_robot("pr2")
 EXAMPLE = Path(__file__).parents[2] / "examples" / "three_boxes.json"
 APART = "(grasp pr2L red) (place pr2L red tab1) (grasp pr2R green) (place pr2R green tab2)"
 LOADED = "(grasp pr2L green) (place pr2L green red) (grasp pr2L red) (place pr2L red tab2)"
+BROUGHT = (
+    "(grasp pr2L green) (place pr2L green red) (grasp pr2L red) (place pr2L red tab2) "
+    "(grasp pr2L blue) (grasp pr2R green)"
+)
+ROOMY = "(grasp pr2R green) (grasp pr2L blue) (place pr2L blue tab2) (place pr2R green tab1)"
+NARROW = (
+    "(grasp pr2L green) (place pr2L green red) (grasp pr2L red) (place pr2L red tab2) "
+    "(grasp pr2R red) (grasp pr2L green)"
+)
+IN_THE_MIDDLE = pose((0.6, 0.0, 0.9))
 ON_HELD = "(grasp pr2R green) (grasp pr2L red) (place pr2L red green)"
 
 
@@ -124,9 +142,12 @@ def test_the_hand_comes_with_fingers_that_are_open() -> None:
     assert report.drift < 0.002
 
 
-def coordinated(setup: str, number: int, actions: str) -> tuple[Scene, PathResult]:
+def coordinated(
+    setup: str, number: int, actions: str, clearance: float = CLEARANCE
+) -> tuple[Scene, PathResult]:
     (scene,) = generate(setup, 1, 30_000 + number, f"execution-{number:03d}").scenes
-    bounds = users_bounds(scene, load_planning().bounds, NEVER, (), coordinate=True)
+    params = load_planning().bounds
+    bounds = users_bounds(scene, params, NEVER, (), coordinate=True, clearance=clearance)
     return scene, bounds.path(parse_skeleton(actions))
 
 
@@ -135,8 +156,15 @@ def coordinated(setup: str, number: int, actions: str) -> tuple[Scene, PathResul
     [
         (42, "(grasp pr2L blue) (place pr2L blue tab2) (grasp pr2R blue) (grasp pr2L green)"),
         (6, "(grasp pr2R red) (place pr2R red green) (grasp pr2R blue) (place pr2R blue tab2)"),
+        (16, BROUGHT),
+        (48, "(grasp pr2L green) (grasp pr2R red) (place pr2L green tab2) (place pr2R red tab1)"),
     ],
-    ids=["through what the other hand takes", "with fingers that are not yet open"],
+    ids=[
+        "through what the other hand takes",
+        "with fingers that are not yet open",
+        "while another hand still brings it",
+        "as another hand passes with it, between rows",
+    ],
 )
 def test_a_hand_does_not_pass_through_the_body_of_a_contact(number: int, actions: str) -> None:
     """It has to be looked at beyond the straight ways: what verification refuses has no motion."""
@@ -144,6 +172,39 @@ def test_a_hand_does_not_pass_through_the_body_of_a_contact(number: int, actions
     trajectory = motion(result)
     assert not np.any(np.diff(trajectory.times) - TICK > 1e-9)  # all arms at once
     assert clearance_of(scene, result.skeleton, trajectory).distance > 0.001
+
+
+def test_arms_that_pass_each_other_between_rows_have_met(apart: tuple[Scene, PathResult]) -> None:
+    scene, result = apart
+    plan, mover = plan_of(scene, result), Mover(scene, 150)
+    roads = {gripper: Road(mover, gripper, stops, True) for gripper, stops in plan.stops.items()}
+    moments = Moments(scene, roads, plan)
+    found = schedule(roads, moments)
+    assert found is not None
+    rows = Timetable(scene, roads, plan, found).rows
+    assert moments.met(found, rows) is None
+    both = next(row for row, at in enumerate(found) if all(isinstance(on, Edge) for on, _ in at))
+    for gripper, arm in PR2.arms.items():
+        middle = reach(scene, gripper, IN_THE_MIDDLE, arm.home)
+        for row, aside in ((both - 1, -0.1), (both, 0.1)):
+            rows[row, arm.slice] = middle + aside * np.eye(len(middle))[0]
+    assert moments.met(found, rows) is found[both]
+
+
+@pytest.mark.parametrize(
+    ("number", "actions", "least"),
+    [(9, ROOMY, 0.009), (1, NARROW, 0.001)],
+    ids=["where there is room", "where there is none"],
+)
+def test_plans_keep_the_wished_distance_where_there_is_room(
+    number: int, actions: str, least: float
+) -> None:
+    near, far = (
+        clearance_of(scene, result.skeleton, motion(result)).distance
+        for scene, result in (coordinated("a", number, actions, wish) for wish in (PADDING, 0.01))
+    )
+    assert near < 0.009
+    assert far > max(near, least) - 1e-4
 
 
 def test_the_same_plan_twice(apart: tuple[Scene, PathResult], together: PathResult) -> None:

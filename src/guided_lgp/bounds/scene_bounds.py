@@ -7,6 +7,7 @@ from guided_lgp.bounds.coarse import CoarseBound
 from guided_lgp.bounds.coarse.facts import Facts
 from guided_lgp.bounds.coarse.pairs import Pairs
 from guided_lgp.bounds.coarse.parts import Boxes, Parts
+from guided_lgp.bounds.collision import PADDING
 from guided_lgp.bounds.deadline import NEVER, Deadline
 from guided_lgp.bounds.goals import GoalTerms
 from guided_lgp.bounds.path import PathBound, Shorten, check_motions
@@ -40,12 +41,14 @@ class SceneBounds:
         firm: bool = False,
         shorten: Shorten | None = None,
         clock: Clock = FASTEST,
+        clearance: float = PADDING,
     ) -> None:
         """Prepare a scene, for plans whose goals may say more than symbols.
 
         ``firm`` ones take, of the motions of several coarse solutions, the first whose grips hold
         what the hands carry: the paper asks for any motion, of one arm at a time, by the time law
-        ``clock``, where ``shorten`` makes no other of it.
+        ``clock``, where ``shorten`` makes no other of it. Motions keep a ``clearance`` (m) from
+        what they do not touch, where there is room.
         """
         check_terms(scene.symbols.domain)
         check_motions(scene.symbols.domain)
@@ -55,7 +58,7 @@ class SceneBounds:
             scene, params.coarse_restarts, deadline=deadline, goals=self._goals, firm=firm
         )
         self._path_solutions, self._firm = params.path_solutions, firm
-        self._shorten, self._clock = shorten, clock
+        self._shorten, self._clock, self._clearance = shorten, clock, clearance
         self._deadline = deadline
         self._parts = Parts(scene, _PATIENCE * params.coarse_restarts, self.facts, deadline)
         self._pairs = Pairs(scene, self._coarse_bound.solve, self._parts.solve)
@@ -136,4 +139,5 @@ class SceneBounds:
             self._firm,
             self._shorten,
             self._clock,
+            self._clearance,
         )

@@ -14,6 +14,7 @@ from guided_lgp.cli.running import complain, lasting_imports
 from guided_lgp.cli.terminal import (
     AsJson,
     PlanningTime,
+    WishedClearance,
     is_plan,
     one_of,
     read_scene_or_plan,
@@ -115,6 +116,7 @@ def plan(
             "unless they are given",
         ),
     ] = False,
+    clearance: WishedClearance = 0.01,
     max_nodes: Annotated[
         int | None,
         typer.Option(
@@ -210,6 +212,7 @@ def plan(
             skeleton=skeleton or (),
             candidates=candidates,
             coordinate=not one_at_a_time,
+            clearance=clearance,
             where=str(scene),
         )
     start, objective = result.scene, result.objective
@@ -227,6 +230,7 @@ def plan(
         "solver_starts": result.solver_starts,
         "path_sequences": result.path_calls,
         "time_s": times,
+        "clearance": result.clearance and {"wished": clearance, **asdict(result.clearance)},
     }
     summary = {
         "solved": result.solved,
@@ -270,6 +274,7 @@ def plan(
             f"policy {policy}, weights {statistics['weights']}; " if statistics["policy"] else ""
         )
         typer.echo(f"with: {guide}limits {statistics['limits']}")
+        typer.echo(f"smallest distance: {result.clearance}")
     else:
         typer.echo("the goals hold already")
     if physics is not None:

@@ -1,13 +1,14 @@
 """``replan``: going on with a plan from what is observed."""
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from guided_lgp.cli.outputs import destinations
-from guided_lgp.cli.terminal import AsJson, PlanFile, PlanningTime, show, spinner
+from guided_lgp.cli.terminal import AsJson, PlanFile, PlanningTime, WishedClearance, show, spinner
 
 app = typer.Typer()
 
@@ -30,6 +31,7 @@ def replan(
             show_default="0: none yet",
         ),
     ] = 0,
+    clearance: WishedClearance = 0.01,
     timeout: PlanningTime = None,
     out: Annotated[
         Path | None,
@@ -51,11 +53,18 @@ def replan(
     target = destinations({"--out": out}, [plan_file, observed])["--out"]
     course, seen = Course.of(read_plan(plan_file)), read_observed(observed)
     with spinner("planning"):
-        found = go_on(course, after, seen, timeout=timeout, where=str(observed))
+        found = go_on(
+            course, after, seen, clearance=clearance, timeout=timeout, where=str(observed)
+        )
     actions = [] if found.path is None else list(map(str, found.path.skeleton))
     if as_json:
         how = None if found.path is None else found.how
-        document = {"how": how, "actions": actions, "explanation": found.explanation}
+        document = {
+            "how": how,
+            "actions": actions,
+            "explanation": found.explanation,
+            "clearance": found.clearance and asdict(found.clearance),
+        }
         typer.echo(json.dumps(document, indent=1))
     if found.path is None:
         typer.echo(f"no plan: {found.explanation}", err=True)
@@ -65,3 +74,4 @@ def replan(
     if not as_json:
         show(["", "action"], [(str(k), action) for k, action in enumerate(actions, 1)])
         typer.echo(f"the rest of the plan: {found.how}")
+        typer.echo(f"smallest distance: {found.clearance}")

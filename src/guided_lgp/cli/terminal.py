@@ -62,6 +62,15 @@ PlanningTime = Annotated[
         show_default="no limit of time",
     ),
 ]
+WishedClearance = Annotated[
+    float,
+    typer.Option(
+        "--clearance",
+        metavar="M",
+        help="Distance that arms, hands and what they carry keep on their way from what they do "
+        "not touch, where there is room: from 0.003 to 0.05.",
+    ),
+]
 
 
 def one_of(names: Collection[str]) -> Callable[[str], str]:

@@ -272,6 +272,51 @@ class CollisionChecker:
         least = self._certificate.gaps(moving, self._apart)
         return self._nearest.distances(self._coordinates(moving), self._active, least, count)
 
+    def narrowest(
+        self, moving: Array, enough: float, between_arms: bool = False
+    ) -> tuple[float, int | None]:
+        """The smallest distance (m) of two bodies in rows (m, joints) of all moving joints, and
+        the row; ``enough`` and None where it is no less.
+
+        Args:
+            moving: the rows.
+            enough: distance (m) above which nothing is of interest.
+            between_arms: only between two arms that move, with what they carry.
+        """
+        pairs = self._of_two_arms() if between_arms else np.arange(len(self._apart))
+        apart = self._apart[pairs]
+        near = self._certificate.near(moving, apart, enough)
+        unsure = np.flatnonzero(near.any(axis=1))
+        coordinates = self._coordinates(moving[unsure])
+        rows, places = near[unsure].nonzero()
+        least = self._certificate.gaps(moving[unsure], apart)[rows, places]
+        smallest, where = enough, None
+        for number in np.argsort(least, kind="stable").tolist():
+            if least[number] >= smallest:
+                break
+            row, pair = rows[number], self._active[pairs[places[number]]]
+            if (distance := self._distance(coordinates[row], pair)) < smallest:
+                smallest, where = distance, int(unsure[row])
+        return smallest, where
+
+    def _of_two_arms(self) -> NDArray[np.intp]:
+        """Which of the pairs that are checked are of two arms, with what they carry."""
+        assert self.entered is not None
+        arm_of = np.zeros(len(self._names), dtype=int)
+        for number, (gripper, shapes) in enumerate(self._arm.items(), start=1):
+            arm_of[shapes] = number
+            for box, (carrier, _) in self.entered.carried.items():
+                arm_of[self._bodies[box] if carrier == gripper else []] = number
+        one, other = arm_of[self._apart].T
+        return np.flatnonzero((one != other) & (one > 0) & (other > 0))
+
+    def _distance(self, coordinates: Array, pair: int) -> float:
+        pin.updateGeometryPlacements(
+            self._model, self._data, self._geometry, self._geometry_data, coordinates
+        )
+        found = pin.computeDistance(self._geometry, self._geometry_data, pair)
+        return float(found.min_distance)
+
     def _coordinates(self, moving: Array) -> Array:
         """Coordinates of the pinocchio model (m, nq) for rows (m, joints) of all moving joints."""
         full = np.empty((len(moving), len(self._template)))

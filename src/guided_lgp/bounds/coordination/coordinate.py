@@ -6,6 +6,7 @@ from dataclasses import replace
 from functools import cached_property
 from math import isnan
 
+from guided_lgp.bounds.collision import PADDING
 from guided_lgp.bounds.coordination.itinerary import Itinerary, itinerary
 from guided_lgp.bounds.coordination.moments import Moments
 from guided_lgp.bounds.coordination.roads import MANNERS, Manner, Road
@@ -16,15 +17,15 @@ from guided_lgp.bounds.goals import NO_TERMS, GoalTerms
 from guided_lgp.bounds.path.motions import Mover
 from guided_lgp.bounds.path.situation import situation_at_start
 from guided_lgp.bounds.results import PathResult
-from guided_lgp.bounds.verify import verify_path
+from guided_lgp.bounds.verify import Violation, verify_path
 from guided_lgp.logic import Skeleton
 from guided_lgp.scene import Scene
 from guided_lgp.scene.world import world_of
 
 _ITERATIONS = 150
 """Samples of the sampling planner per motion, as of the path bound."""
-_ATTEMPTS = 3
-"""Schedules that are verified, each without the faults of those before."""
+_ATTEMPTS = 5
+"""Schedules that are looked at, each without the faults of those before."""
 
 
 class Coordinator:
@@ -36,6 +37,7 @@ class Coordinator:
         deadline: Deadline = NEVER,
         goals: GoalTerms = NO_TERMS,
         in_order: bool = False,
+        clearance: float = PADDING,
     ) -> None:
         """Prepare for one scene.
 
@@ -44,16 +46,17 @@ class Coordinator:
             deadline: after which it gives up.
             goals: terms that the motion keeps.
             in_order: whether all actions take effect one after the other as they are given.
+            clearance: see :class:`Mover`.
         """
         self._scene = scene
-        self._deadline, self._in_order = deadline, in_order
+        self._deadline, self._in_order, self._clearance = deadline, in_order, clearance
         self._goals = goals
         self._start = situation_at_start(scene, goals.upright)
 
     @cached_property
     def _mover(self) -> Mover:
         """Made when first needed: most searches end without a path."""
-        return Mover(self._scene, _ITERATIONS, self._deadline)
+        return Mover(self._scene, _ITERATIONS, self._deadline, self._clearance)
 
     def shorten(self, result: PathResult) -> PathResult:
         """The same actions in less time; actions of two arms may change places.
@@ -79,34 +82,49 @@ class Coordinator:
         return result
 
     def _scheduled(self, skeleton: Skeleton, plan: Itinerary, manner: Manner) -> PathResult | None:
-        """A verified motion by the ways of all arms."""
+        """A verified motion by the ways of all arms, which are apart also between rows if a few
+        attempts find such a one.
+        """
         busy = sum(len(stops) > 1 for stops in plan.stops.values())
         roads = {
             gripper: Road(self._mover, gripper, stops, busy > 1, manner)
             for gripper, stops in plan.stops.items()
         }
         moments = Moments(self._scene, roads, plan)
+        near: PathResult | None = None
         for _ in range(_ATTEMPTS):
             self._deadline.check()
             found = schedule(roads, moments)
             if found is None:
-                return None
-            motion = Timetable(self._scene, roads, plan, found)
-            actions = tuple(skeleton[number] for number, _ in motion.switches)
-            trajectory = motion.trajectory(actions)
-            report = verify_path(world_of(self._scene), actions, trajectory, self._goals)
-            if report.violation is None:
-                return PathResult(
-                    actions,
-                    feasible=True,
-                    trajectory=trajectory,
-                    at_switch=motion.keyframes(self._mover.arms),
-                    verification={
-                        "configurations": report.configurations,
-                        "deepest_penetration_m": report.deepest_penetration,
-                    },
-                )
-            if isnan(report.violation.time):
-                return None  # what is wrong is nothing that another moment would mend
-            moments.block(found[motion.row_at(report.violation.time)])
-        return None
+                break
+            timetable = Timetable(self._scene, roads, plan, found)
+            motion = self._verified(skeleton, timetable)
+            if isinstance(motion, Violation):
+                if isnan(motion.time):
+                    break  # what is wrong is nothing that another moment would mend
+                moments.block(found[timetable.row_at(motion.time)])
+                continue
+            met = moments.met(found, timetable.rows)
+            if met is None:
+                return motion
+            near = near or motion
+            moments.block(met)
+        return near
+
+    def _verified(self, skeleton: Skeleton, timetable: Timetable) -> PathResult | Violation:
+        """The motion of a schedule, or what is wrong with it."""
+        actions = tuple(skeleton[number] for number, _ in timetable.switches)
+        trajectory = timetable.trajectory(actions)
+        report = verify_path(world_of(self._scene), actions, trajectory, self._goals)
+        if report.violation is not None:
+            return report.violation
+        return PathResult(
+            actions,
+            feasible=True,
+            trajectory=trajectory,
+            at_switch=timetable.keyframes(self._mover.arms),
+            verification={
+                "configurations": report.configurations,
+                "deepest_penetration_m": report.deepest_penetration,
+            },
+        )

@@ -1,13 +1,13 @@
 """Whether all arms, each somewhere on its way, are clear of each other and of every body."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
-from guided_lgp.bounds.collision import PlanningScene, checker_of
-from guided_lgp.bounds.coordination.itinerary import Itinerary
+from guided_lgp.bounds.collision import PADDING, PlanningScene, checker_of
+from guided_lgp.bounds.coordination.itinerary import Bodies, Itinerary
 from guided_lgp.bounds.coordination.roads import Edge, Node, Road
 from guided_lgp.bounds.results import Array
 from guided_lgp.scene import Scene
@@ -36,7 +36,7 @@ class Moments:
     def __init__(self, scene: Scene, roads: Mapping[str, Road], plan: Itinerary) -> None:
         self._checker = checker_of(scene)
         self._robot = scene.robot.description
-        self._roads = list(roads.values())
+        self._roads = roads
         self._plan = plan
         self._actions = [
             {number: stop.contact for number, stop in enumerate(stops) if stop.acts}
@@ -45,6 +45,7 @@ class Moments:
         self._verdicts: dict[tuple[Edge | Node | int, ...], NDArray[np.int8]] = {}
         """Of all moments at which the same arms are as far apart on their ways, one after the
         other."""
+        self._placed: dict[frozenset[int], Bodies] = {}
         self._scenes: dict[tuple[frozenset[int], frozenset[int]], PlanningScene] = {}
 
     def clear(self, start: Moment, ticks: int) -> bool:
@@ -57,6 +58,22 @@ class Moments:
         coarse = np.s_[::-_COARSE]
         order = np.concatenate([unknown[coarse], np.delete(unknown, coarse)])
         return self._judge(start, order, verdicts)
+
+    def met(self, moments: Sequence[Moment], rows: Array) -> Moment | None:
+        """The moment of a schedule, with its rows (T, joints), halfway to which two arms come
+        nearest to each other, if too near: they may pass each other between rows.
+        """
+        halfway, nearest, met = (rows[1:] + rows[:-1]) / 2, PADDING, None
+        by_scene: dict[tuple[frozenset[int], frozenset[int]], list[int]] = {}
+        for number, moment in enumerate(moments[1:]):
+            if sum(isinstance(at, Edge) for at, _ in moment) > 1:
+                done = self._done(moment)
+                by_scene.setdefault((done, self._contacts(moment, done)), []).append(number)
+        for scene, numbers in by_scene.items():
+            self._checker.enter(self._scene(*scene))
+            nearest, row = self._checker.narrowest(halfway[numbers], nearest, between_arms=True)
+            met = met if row is None else moments[1 + numbers[row]]
+        return met
 
     def block(self, moment: Moment) -> None:
         """Never come near a moment again: what collides there passes the rows beside it, too."""
@@ -76,7 +93,7 @@ class Moments:
         """The last stop of every arm that is over."""
         return [
             road.over(where) if isinstance(where, Node) else where.over
-            for road, (where, _) in zip(self._roads, moment, strict=True)
+            for road, (where, _) in zip(self._roads.values(), moment, strict=True)
         ]
 
     def _known(self, moment: Moment) -> tuple[NDArray[np.int8], int]:
@@ -98,7 +115,7 @@ class Moments:
         phases = self._phases(start, ticks)
         for phase in dict.fromkeys(phases.tolist()):
             those = ticks[phases == phase]
-            contacts = self._contacts(tuple(later(at, int(those[0])) for at in start))
+            contacts = self._contacts(tuple(later(at, int(those[0])) for at in start), done)
             self._checker.enter(self._scene(done, contacts))
             hit = self._checker.collisions(self._rows(start, those))
             first = next((row for row, _ in hit), len(those))
@@ -121,7 +138,7 @@ class Moments:
         """All moving joints (m, joints), some ticks (m,) after a moment."""
         rows = np.empty((len(ticks), len(self._robot.moving_joints)))
         arms = self._robot.arms.values()
-        for arm, road, (where, row) in zip(arms, self._roads, moment, strict=True):
+        for arm, road, (where, row) in zip(arms, self._roads.values(), moment, strict=True):
             if isinstance(where, Node):
                 q, fingers = road.rest(where)
                 values = fingers * arm.fingers.ratios
@@ -140,15 +157,27 @@ class Moments:
             if number <= over and action is not None
         )
 
-    def _contacts(self, moment: Moment) -> frozenset[int]:
-        """The actions in whose contacts hands are, or straight before or after them."""
-        return frozenset(
-            contact
-            for road, (where, row) in zip(self._roads, moment, strict=True)
-            for contact in (
-                road.contacts(where) if isinstance(where, Node) else where.contacts(row)
-            )
-        )
+    def _contacts(self, moment: Moment, done: frozenset[int]) -> frozenset[int]:
+        """The actions in whose contacts hands are, or straight before or after them; not of a hand
+        at a body with which another one is still, or already, on its way.
+        """
+        at = {
+            gripper: road.contacts(where) if isinstance(where, Node) else where.contacts(row)
+            for (gripper, road), (where, row) in zip(self._roads.items(), moment, strict=True)
+        }
+        carried, found = self._bodies(done).carried, set[int]()
+        for gripper, contact in ((g, c) for g, contacts in at.items() for c in contacts):
+            change = self._plan.changes[contact]
+            carrier, _ = carried.get(change.body, (gripper, None))
+            if contact in at[carrier] or gripper not in change.contacts:
+                found.add(contact)
+        return frozenset(found)
+
+    def _bodies(self, done: frozenset[int]) -> Bodies:
+        """Where all bodies are."""
+        if done not in self._placed:
+            self._placed[done] = self._plan.bodies(done)
+        return self._placed[done]
 
     def _scene(self, done: frozenset[int], contacts: frozenset[int]) -> PlanningScene:
         """What is where, and what may touch."""
@@ -157,7 +186,7 @@ class Moments:
         return self._scenes[done, contacts]
 
     def _made(self, done: frozenset[int], contacts: frozenset[int]) -> PlanningScene:
-        bodies = self._plan.bodies(done)
+        bodies = self._bodies(done)
         held = {frozenset((box, hand)) for box, hand in bodies.holders.items() if hand is not None}
         at_contact = {
             frozenset((change.body, other))

@@ -44,9 +44,9 @@ class Timetable:
     def trajectory(self, skeleton: Skeleton) -> Trajectory:
         """The motion, by the actions in the order in which they take effect."""
         rows = [row for _, row in self.switches]
-        attachments = spans(self._scene.state, skeleton, rows, len(self._rows), carriers)
-        times = TICK * np.arange(len(self._rows), dtype=float)
-        return Trajectory(self._robot.moving_joints, times, self._rows, tuple(attachments))
+        attachments = spans(self._scene.state, skeleton, rows, len(self.rows), carriers)
+        times = TICK * np.arange(len(self.rows), dtype=float)
+        return Trajectory(self._robot.moving_joints, times, self.rows, tuple(attachments))
 
     def keyframes(self, arms: Mapping[str, PlacedArm]) -> tuple[Keyframe, ...]:
         """The configuration at every switch."""
@@ -54,7 +54,7 @@ class Timetable:
         done, found = set[int](), []
         for action, row in self.switches:
             done.add(action)
-            q, bodies = self._rows[row, :joints], self._plan.bodies(done)
+            q, bodies = self.rows[row, :joints], self._plan.bodies(done)
             tools = {gripper: tool_pose(arm, q) for gripper, arm in arms.items()}
             carried = {b: compose(tools[g], grasp) for b, (g, grasp) in bodies.carried.items()}
             found.append(Keyframe(q, {**bodies.standing, **carried}))
@@ -65,7 +65,7 @@ class Timetable:
         return min(int(np.ceil(time / TICK - 1e-9)), len(self._moments) - 1)
 
     @cached_property
-    def _rows(self) -> Array:
+    def rows(self) -> Array:
         """(T, joints) all moving joints."""
         rows = np.empty((len(self._moments), len(self._robot.moving_joints)))
         for row, moment in zip(rows, self._moments, strict=True):

@@ -7,6 +7,7 @@ from dataclasses import replace
 from itertools import chain, islice
 
 from guided_lgp.bounds.coarse import CoarseBound
+from guided_lgp.bounds.collision import PADDING
 from guided_lgp.bounds.deadline import NEVER, Deadline, OutOfTimeError
 from guided_lgp.bounds.goals import NO_TERMS, GoalTerms
 from guided_lgp.bounds.path.assembly import FASTEST, Clock, assemble, stay
@@ -57,6 +58,7 @@ class PathBound:
         firm: bool = False,
         shorten: Shorten | None = None,
         clock: Clock = FASTEST,
+        clearance: float = PADDING,
     ) -> None:
         """Prepare for one scene.
 
@@ -69,13 +71,14 @@ class PathBound:
             firm: whether grips have to hold what the hands carry.
             shorten: makes one motion of the steps, where it can; else one arm moves at a time ...
             clock: ... by this time law.
+            clearance: see :class:`Mover`.
         """
         self._scene = scene
         self._coarse = coarse
         self._solutions = solutions
         self._goals = goals
         self._firm, self._shorten, self._clock = firm, shorten, clock
-        self._mover = Mover(scene, _ITERATIONS, deadline)
+        self._mover = Mover(scene, _ITERATIONS, deadline, clearance)
         self._grips = {
             (gripper, box.name): grips_of(box, arm)
             for gripper, arm in self._mover.robot.arms.items()

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from guided_lgp.bounds.checks import body_names, overlap_name
-from guided_lgp.bounds.collision import PlanningScene, checker_of
+from guided_lgp.bounds.collision import PADDING, PlanningScene, checker_of
 from guided_lgp.bounds.deadline import NEVER, Deadline
 from guided_lgp.bounds.path.connect import connect, shortcut
 from guided_lgp.bounds.path.spaces import (
@@ -94,7 +94,23 @@ class Motion:
 class Mover:
     """Plans motions in one scene. Deterministic: every call brings its source of randomness."""
 
-    def __init__(self, scene: Scene, iterations: int, deadline: Deadline = NEVER) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        iterations: int,
+        deadline: Deadline = NEVER,
+        clearance: float = PADDING,
+    ) -> None:
+        """Prepare for one scene.
+
+        Args:
+            scene: the initial configuration.
+            iterations: samples of the sampling planner per motion.
+            deadline: after which there are no more motions.
+            clearance: distance (m) that optimised motions keep where there is room; all keep
+                ``PADDING``.
+        """
+        self.clearance = clearance
         base, fixed = scene.robot.base_pose, scene.robot.fixed_values
         self.robot = scene.robot.description
         self.arms = {g: PlacedArm(self.robot, g, base, fixed) for g in self.robot.grippers}
@@ -133,6 +149,14 @@ class Mover:
     def collisions(self, surroundings: Surroundings, q: Array) -> list[Pair | None]:
         """The first pair in each of some configurations (m, n); these queries are not counted."""
         return self._space(surroundings).collisions(q)
+
+    def room(self, surroundings: Surroundings, q: Array, enough: float) -> float:
+        """The smallest distance (m) along free configurations (m, n) of the moving arm, or
+        ``enough`` if it is more.
+        """
+        if enough <= PADDING:
+            return enough
+        return self._space(surroundings).room(q, enough)
 
     def distances(self, surroundings: Surroundings, q: Array, count: int) -> tuple[Array, Array]:
         """Smallest distances (m, count) in m along configurations (m, n) of the moving arm, and

@@ -12,10 +12,11 @@ in between are one: the arm need not go home on the way. Constraints are the joi
 every waypoint and the pairs of bodies nearest to each other there, the distance d and the tilt z
 (the vertical in the tool frame, kept on level motions), both linearised about the last iterate p:
 
-    d(p_i) + d'(p_i) (q_i - p_i) >= CLEARANCE - slack_i,    z(p_i) + z'(p_i) (q_i - p_i) = z_0.
+    d(p_i) + d'(p_i) (q_i - p_i) >= clearance - slack_i,    z(p_i) + z'(p_i) (q_i - p_i) = z_0.
 
 CasADi derives this quadratic program once; every motion only fills in its numbers. An iterate
-counts if its whole spline passes the collision checker.
+counts if its whole spline passes the collision checker; of several the roomiest is taken, up to the
+distance that is wished.
 """
 
 from collections.abc import Iterable, Sequence
@@ -38,7 +39,9 @@ from guided_lgp.bounds.results import Array
 from guided_lgp.robots import Arm, PlacedArm
 
 CLEARANCE = 0.012
-"""Distance (m) of bodies at the waypoints."""
+"""Distance (m) of bodies at the waypoints, at least ..."""
+_BETWEEN = 0.002
+"""... and how much more (m) than is wished: between them a spline comes nearer."""
 ROUNDS = 5
 """Quadratic programs per motion, at most."""
 LEVEL = 0.01
@@ -47,6 +50,8 @@ _TRUST = 0.3
 """Largest change (rad) of a joint in a round that linearises constraints."""
 _CONVERGED = 0.03
 """Change (rad) below which another round is not worth its time."""
+_NARROWER = 0.001
+"""How much nearer (m) a motion may come to something than at its ends, before it makes a detour."""
 _SHORTEST = 0.05
 """Shortest motion (s at full speed) that is optimised."""
 _INSET, _NEAR_LIMIT = 0.02, 0.005
@@ -141,12 +146,15 @@ def optimal_path(
     points = np.stack([np.interp(spline.knots, s, joint) for joint in path.T], axis=1)
     vertical = placed.forward(path[0])[0][2] if transit.keep_level else None
     limits, program = arm.limits, quadratic_program(mover.robot, arm.mirror_of or arm.gripper)
+    enough = mover.room(transit.surroundings, path[[0, -1]], mover.clearance) - _NARROWER
+    clearance = max(CLEARANCE, mover.clearance + _BETWEEN)
     best: Array | None = None
+    most = -np.inf
     for number in range(ROUNDS):
         linearised = transit.keep_level or number > 0
         last, inner = points, points[1:-1]
         near = mover.distances(transit.surroundings, inner, NEIGHBOURS) if linearised else None
-        found = _round(program, spline, last, near, arm, vertical)
+        found = _round(program, spline, last, near, clearance, arm, vertical)
         if found is None:
             break
         moved = np.concatenate([last[:1], found, last[-1:]])
@@ -157,10 +165,12 @@ def optimal_path(
             and mover.collision(transit.surroundings, candidate) is None
         )
         if clear:
-            best = candidate
-            if not linearised or np.abs(moved - last).max() < _CONVERGED:
+            room = mover.room(transit.surroundings, candidate, enough)
+            if room >= most:
+                best, most = candidate, room
+            if np.abs(moved - last).max() < _CONVERGED if linearised else room >= enough:
                 break
-        points = moved if linearised else last
+        points = moved if linearised or clear else last
     return best
 
 
@@ -209,6 +219,7 @@ def _round(
     spline: _Spline,
     last: Array,
     near: tuple[Array, Array] | None,
+    clearance: float,
     arm: Arm,
     vertical: Array | None,
 ) -> Array | None:
@@ -220,6 +231,7 @@ def _round(
         last: the iterate (WAYPOINTS + 2, n) with both ends.
         near: distances (WAYPOINTS, NEIGHBOURS) and gradients (..., n); None to leave them out,
             and the trust region with them.
+        clearance: the least distance (m) there.
         arm: whose motion it is; a mirror image is solved as the original.
         vertical: (3,) in the tool frame, where it is to be kept.
 
@@ -234,7 +246,7 @@ def _round(
     least = np.full((WAYPOINTS, NEIGHBOURS), -np.inf)
     if near is not None:
         distances, gradients = near
-        least = CLEARANCE - distances + np.einsum("imj,ij->im", gradients, inner)
+        least = clearance - distances + np.einsum("imj,ij->im", gradients, inner)
         low, high = np.maximum(low, inner - _TRUST), np.minimum(high, inner + _TRUST)
     before = last[0] if spline.out is None else last[0] - h * spline.out
     after = last[-1] if spline.into is None else last[-1] + h * spline.into

@@ -62,6 +62,11 @@ class JointSpace:
         values, gradients = self._checker.distances(self._whole(path), self._fingers, count)
         return values, gradients[..., self._joints]
 
+    def room(self, path: Array, enough: float) -> float:
+        """The smallest distance (m) along a path (m, n), or ``enough`` if it is more."""
+        moving = self._checker.moving_joints(self._whole(path), self._fingers)
+        return self._checker.narrowest(moving, enough)[0]
+
     def _whole(self, path: Array) -> Array:
         q = np.empty((len(path), len(self._q)))
         q[:] = self._q
