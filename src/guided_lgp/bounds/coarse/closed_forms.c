@@ -33,27 +33,28 @@ static void fill(const grid *g, int cell, int candidate, double *x)
     memcpy(x + 12, g->grasp + 2, sizeof(double) * 3);
 }
 
-/* Joints (poses, pitches, ends, candidates, outputs - 1), and the costs (poses, pitches, candidates)
- * of all ends together. */
-void coarse_holds(int form, int outputs, const grid *g, double *joints, double *costs)
+/* Joints (ends, outputs - 1) of the candidate of least cost of all ends together, the first pose and
+ * pitch, where each costs something extra (candidates). No cost is negative, so that a candidate
+ * whose first ends cost too much need not be followed further. */
+void coarse_hold(int form, int outputs, const grid *g, const double *extra, double *joints)
 {
-    double x[FORM_INPUTS], out[outputs];
-    for (int cell = 0; cell < g->poses * g->pitches; cell++)
-        for (int c = 0; c < g->candidates; c++) {
-            double sum = 0;
-            fill(g, cell, c, x);
-            for (int e = 0; e < g->ends; e++) {
-                evaluate(form, g, e, x, out);
-                int row = (cell * g->ends + e) * g->candidates + c;
-                memcpy(joints + row * (outputs - 1), out, sizeof(double) * (outputs - 1));
-                sum += out[outputs - 1];
-            }
-            costs[cell * g->candidates + c] = sum;
+    double x[FORM_INPUTS], out[outputs], found[g->ends * (outputs - 1)], least = HUGE_VAL;
+    for (int c = 0; c < g->candidates; c++) {
+        double sum = 0;
+        fill(g, 0, c, x);
+        for (int e = 0; e < g->ends && sum < least; e++) {
+            evaluate(form, g, e, x, out);
+            memcpy(found + e * (outputs - 1), out, sizeof(double) * (outputs - 1));
+            sum += out[outputs - 1];
         }
+        if (sum + extra[c] < least) {
+            least = sum + extra[c];
+            memcpy(joints, found, sizeof found);
+        }
+    }
 }
 
-/* The least of these costs (poses, pitches). No cost is negative, so that a candidate whose first
- * ends cost too much need not be followed further. */
+/* The least costs (poses, pitches), without anything extra. */
 void coarse_least_costs(int form, int outputs, const grid *g, const double *none, double *costs)
 {
     double x[FORM_INPUTS], out[outputs];

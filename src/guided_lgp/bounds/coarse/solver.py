@@ -121,9 +121,9 @@ class Compiled:
         self._solve = library.coarse_solve
         self._solve.restype = ctypes.c_int
         self._solve.argtypes = [ctypes.c_void_p] * 5
-        self._holds = library.coarse_holds
+        self._hold = library.coarse_hold
         self._least_costs = library.coarse_least_costs
-        for function in (self._holds, self._least_costs):
+        for function in (self._hold, self._least_costs):
             function.restype = None
             function.argtypes = [ctypes.c_int] * 2 + [ctypes.c_void_p] * 3
         arms = closed_form_arms(kinematics_of(robot))
@@ -148,15 +148,13 @@ class Compiled:
         )
         return Solution(values, residuals, worst.value, steps)
 
-    def holds(self, chain: str, grid: Grid) -> tuple[Array, Array]:
+    def hold(self, chain: str, grid: Grid, extra: Array) -> Array:
         """See :class:`ClosedForms`."""
         number, outputs = self._forms[chain]
-        poses, pitches, _, candidates = grid.shape
-        joints = np.empty((*grid.shape, outputs - 1))
-        costs = np.empty((poses, pitches, candidates))
+        joints = np.zeros((len(grid.ends), outputs - 1))
         header = _CGrid.of(grid)
-        self._holds(number, outputs, ctypes.addressof(header), address(joints), address(costs))
-        return joints, costs
+        self._hold(number, outputs, ctypes.addressof(header), address(extra), address(joints))
+        return joints
 
     def least_costs(self, chain: str, grid: Grid) -> Array:
         """See :class:`ClosedForms`."""
@@ -227,15 +225,20 @@ class Interpreter:
             penalty = min(penalty * settings.growth, settings.largest_penalty)
         return Solution(values, c, worst, tried)
 
-    def holds(self, chain: str, grid: Grid) -> tuple[Array, Array]:
+    def hold(self, chain: str, grid: Grid, extra: Array) -> Array:
         """See :class:`ClosedForms`."""
-        form, arguments = closed_forms(self._robot)[chain], grid.arguments().reshape(-1, INPUTS)
-        solutions = np.array(form.map(len(arguments))(arguments.T)).T.reshape(*grid.shape, -1)
-        return solutions[..., :-1], solutions[..., -1].sum(axis=2)
+        solutions = self._solutions(chain, grid)[0, 0]
+        costs = solutions[..., -1].sum(axis=0) + extra
+        return np.asarray(solutions[:, costs.argmin(), :-1])
 
     def least_costs(self, chain: str, grid: Grid) -> Array:
         """See :class:`ClosedForms`."""
-        return np.asarray(self.holds(chain, grid)[1].min(axis=2))
+        return np.asarray(self._solutions(chain, grid)[..., -1].sum(axis=2).min(axis=2))
+
+    def _solutions(self, chain: str, grid: Grid) -> Array:
+        """Joints, then the cost, of all candidates (N, M, E, C, n + 1)."""
+        form, arguments = closed_forms(self._robot)[chain], grid.arguments().reshape(-1, INPUTS)
+        return np.array(form.map(len(arguments))(arguments.T)).T.reshape(*grid.shape, -1)
 
     def _arguments(self, program: Program, i: int, values: Array) -> tuple[Kernel, Array, Array]:
         kernel = self._table[program.kernel[i]]

@@ -62,10 +62,14 @@ class Draft:
         return pose_values(self.values, self._variables, pose)
 
     def choose(self, costs: Array) -> int:
-        """The index of the least cost, or of another low one."""
+        """The index of the least cost (C,), or of another low one."""
+        return int((costs + self.extra(len(costs))).argmin())
+
+    def extra(self, count: int) -> Array:
+        """What so many candidates cost besides, so that others than the best are chosen, too."""
         if self.noise:
-            costs = costs + self.noise * self.generator.exponential(1.0, costs.shape)
-        return int(costs.argmin())
+            return self.noise * self.generator.exponential(1.0, count)
+        return np.zeros(count)
 
 
 def pose_values(

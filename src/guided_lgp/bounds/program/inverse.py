@@ -71,22 +71,29 @@ class Grid(NamedTuple):
 class ClosedForms(Protocol):
     """Evaluates the closed forms of chains."""
 
-    def holds(self, chain: str, grid: Grid) -> tuple[Array, Array]:
-        """Joints (N, M, E, C, n), and the costs (N, M, C) of all ends together."""
+    def hold(self, chain: str, grid: Grid, extra: Array) -> Array:
+        """Joints (E, n) at the first pose and pitch, of the candidate of least cost.
+
+        The costs are those of all ends together, and some extra cost (C,) of each candidate.
+        """
         ...
 
     def least_costs(self, chain: str, grid: Grid) -> Array:
-        """The least of these costs (N, M)."""
+        """The least of these costs (N, M), without anything extra."""
         ...
+
+
+Extra = Callable[[int], Array]
+"""What so many candidates (C,) cost besides; nothing of it is negative."""
 
 
 class StartIk(Protocol):
     """Inverse kinematics of one arm for starts, in the convention of its chain."""
 
-    def __call__(
+    def least_costs(
         self, held: HeldBox, hand: Hand, poses: Array, pitches: Array, ends: Array
-    ) -> tuple[Array, Array]:
-        """Hold a box at poses.
+    ) -> Array:
+        """The least costs of holding a box at poses.
 
         Args:
             held: the grasp's lengths and turn.
@@ -96,15 +103,18 @@ class StartIk(Protocol):
             ends: (E, 2) back along the approach and up (m); the first is the contact.
 
         Returns:
-            joints (N, M, E, candidates, n) within their limits, and costs (N, M, candidates) of
-            what is missing, of limits, and of the way. One candidate is one motion.
+            costs (N, M) of what is missing, of limits, and of the way, over all candidates. One
+            candidate is one motion.
         """
         ...
 
-    def least_costs(
-        self, held: HeldBox, hand: Hand, poses: Array, pitches: Array, ends: Array
+    def hold(
+        self, held: HeldBox, hand: Hand, place: Array, pitch: Array, ends: Array, extra: Extra
     ) -> Array:
-        """The least of these costs (N, M)."""
+        """Joints (E, n) within their limits that hold a box at one place (1, 4) by one pitch (1,).
+
+        Of the candidate of least cost, where each costs something ``extra``.
+        """
         ...
 
 
@@ -123,21 +133,22 @@ class ClosedForm:
         self._candidates[:, 9:11] = arm.side, lifted
         self._candidates[:, 16:] = arm.home[:_SHOULDER_JOINTS]
 
-    def __call__(
-        self, held: HeldBox, hand: Hand, poses: Array, pitches: Array, ends: Array
-    ) -> tuple[Array, Array]:
-        """See :class:`StartIk`."""
-        if held.side.flat:  # the formulas are for fingers that close on upright sides
-            return self._flat()(held, hand, poses, pitches, ends)
-        return self._forms.holds(self._chain, self._grid(held, hand, poses, pitches, ends))
-
     def least_costs(
         self, held: HeldBox, hand: Hand, poses: Array, pitches: Array, ends: Array
     ) -> Array:
         """See :class:`StartIk`."""
-        if held.side.flat:
+        if held.side.flat:  # the formulas are for fingers that close on upright sides
             return self._flat().least_costs(held, hand, poses, pitches, ends)
         return self._forms.least_costs(self._chain, self._grid(held, hand, poses, pitches, ends))
+
+    def hold(
+        self, held: HeldBox, hand: Hand, place: Array, pitch: Array, ends: Array, extra: Extra
+    ) -> Array:
+        """See :class:`StartIk`."""
+        if held.side.flat:
+            return self._flat().hold(held, hand, place, pitch, ends, extra)
+        grid = self._grid(held, hand, place, pitch, ends)
+        return self._forms.hold(self._chain, grid, extra(len(self._candidates)))
 
     def _grid(self, held: HeldBox, hand: Hand, poses: Array, pitches: Array, ends: Array) -> Grid:
         grasp = np.array([*hand, held.side.half_length, held.half_height, held.side.turn])
@@ -157,10 +168,27 @@ class General:
         self._mounting = robot.mounting
         self._values = self._solver.redundancies(_VALUES)
 
-    def __call__(
+    def least_costs(
+        self, held: HeldBox, hand: Hand, poses: Array, pitches: Array, ends: Array
+    ) -> Array:
+        """See :class:`StartIk`."""
+        return np.asarray(self._holds(held, hand, poses, pitches, ends)[1].min(axis=2))
+
+    def hold(
+        self, held: HeldBox, hand: Hand, place: Array, pitch: Array, ends: Array, extra: Extra
+    ) -> Array:
+        """See :class:`StartIk`."""
+        joints, costs = self._holds(held, hand, place, pitch, ends)
+        chosen = (costs[0, 0] + extra(costs.shape[-1])).argmin()
+        return np.asarray(joints[0, 0, :, chosen])
+
+    def _holds(
         self, held: HeldBox, hand: Hand, poses: Array, pitches: Array, ends: Array
     ) -> tuple[Array, Array]:
-        """See :class:`StartIk`; every branch at the contact goes on on the nearest at the ends."""
+        """Joints (N, M, E, C, n) and costs (N, M, C) of candidates.
+
+        Every branch at the contact goes on on the nearest at the ends.
+        """
         rotation, position = tool_targets(held, hand, poses, pitches, ends, self._arm.palm_front)
         q, missing = self._solver.nearest(
             self._mounting.T @ rotation[..., None, :, :],
@@ -175,12 +203,6 @@ class General:
         costs = _cost(values, limited, lost, self._home[:_SHOULDER_JOINTS])
         costs = costs.reshape(candidates).sum(axis=2)
         return within.reshape(*candidates, joints.shape[-1]), costs
-
-    def least_costs(
-        self, held: HeldBox, hand: Hand, poses: Array, pitches: Array, ends: Array
-    ) -> Array:
-        """See :class:`StartIk`."""
-        return np.asarray(self(held, hand, poses, pitches, ends)[1].min(axis=2))
 
     def _followed(self, q: Array, missing: Array) -> tuple[Array, Array]:
         """For every branch at the contact, the nearest one at each end.

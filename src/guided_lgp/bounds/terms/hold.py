@@ -8,7 +8,7 @@ configuration, and of the far end of each straight way to it or from it.
 from array import array
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from functools import cache
+from functools import cache, lru_cache
 
 import casadi as ca
 import numpy as np
@@ -253,11 +253,10 @@ def start(draft: Draft, held: HeldBox) -> None:
     for configuration in configurations:
         if configuration.joints[0] >= draft.kept:
             place, ends = _place(draft, configuration), _ends(configuration.segments)
-            joints, costs = draft.ik[held.gripper](held, _hand(draft, held), place, tried, ends)
-            chosen = draft.choose(costs[0, 0])
-            slots_of = (configuration.joints, *(s.joints for s in configuration.segments))
-            for slots, values in zip(slots_of, joints[0, 0, :, chosen], strict=True):
-                draft.values[list(slots)] = values
+            hold = draft.ik[held.gripper].hold
+            joints = hold(held, _hand(draft, held), place, tried, ends, draft.extra)
+            slots = (configuration.joints, *(s.joints for s in configuration.segments))
+            draft.values[np.array(slots)] = joints
 
 
 def costs_of_both(
@@ -305,7 +304,12 @@ def _hand(draft: Draft, held: HeldBox) -> Hand:
 
 def _ends(segments: tuple[StraightSegment, ...]) -> Array:
     """How far (1 + segments, 2) back and up the hand is, the contact first."""
-    return np.array([(0.0, 0.0), *((segment.back, segment.up) for segment in segments)])
+    return _ends_of(tuple((segment.back, segment.up) for segment in segments))
+
+
+@lru_cache(maxsize=64)
+def _ends_of(lines: tuple[tuple[float, float], ...]) -> Array:
+    return np.array([(0.0, 0.0), *lines])
 
 
 _PITCHES = np.pi * np.array([0.2, 0.35, 0.5, 0.65, 0.8])
