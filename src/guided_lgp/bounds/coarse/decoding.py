@@ -11,7 +11,7 @@ from guided_lgp.bounds.coarse.solver import Solution
 from guided_lgp.bounds.program.draft import pose_values
 from guided_lgp.bounds.program.geometry import SceneGeometry
 from guided_lgp.bounds.program.grasp import in_tool
-from guided_lgp.bounds.program.kernels import SCALE, KernelShape, KernelTable
+from guided_lgp.bounds.program.kernels import SCALE
 from guided_lgp.bounds.program.slots import HeldBox, KeyframeSlots, PlanarPose
 from guided_lgp.bounds.results import Array, Failure, Keyframe
 from guided_lgp.poses import compose
@@ -25,6 +25,7 @@ class Decoder:
         self._geometry = geometry
         self._robot = placed.description
         self._table = kernel_shapes(self._robot)
+        self._equality = np.array([kernel.equality for kernel in self._table])
         self._start = placed.start
         self._tools = {
             gripper: placed.tool_pose(self._robot.home, gripper) for gripper in self._robot.grippers
@@ -76,20 +77,12 @@ class Decoder:
 
     def failure(self, formulation: Formulation, solution: Solution, slack: float) -> Failure:
         """The constraint that is violated most."""
-        starts = formulation.program.starts[2]
-        excess, index, row = -np.inf, 0, 0
-        for i, instance in enumerate(formulation.instances):
-            values = solution.residuals[starts[i] : starts[i + 1]]
-            amounts = _amounts(self._table, instance.kernel, values, slack)
-            highest = int(np.argmax(amounts))
-            if amounts[highest] > excess:
-                excess, index, row = float(amounts[highest]), i, highest
-        instance = formulation.instances[index]
-        amount = abs(float(solution.residuals[starts[index] + row]))
-        scale = SCALE if row < self._table[instance.kernel].lengths else 1.0
-        return Failure(instance.action, instance.name(row), amount / scale, "solver")
-
-
-def _amounts(table: KernelTable[KernelShape], number: int, values: Array, slack: float) -> Array:
-    """By how much the rows of a kernel are violated (scaled)."""
-    return np.abs(values) if table[number].equality else -values - slack
+        program, residuals = formulation.program, solution.residuals
+        starts = program.starts[2]
+        equality = np.repeat(self._equality[program.kernel], np.diff(starts))
+        row = int(np.argmax(np.where(equality, np.abs(residuals), -residuals - slack)))
+        index = int(np.searchsorted(starts, row, side="right")) - 1
+        instance, own = formulation.instances[index], row - int(starts[index])
+        scale = SCALE if own < self._table[instance.kernel].lengths else 1.0
+        amount = abs(float(residuals[row]))
+        return Failure(instance.action, instance.name(own), amount / scale, "solver")
