@@ -115,8 +115,7 @@ def test_what_is_certified_is_not_looked_at(monkeypatch: pytest.MonkeyPatch) -> 
 def test_without_a_compiler_pybullet_judges_all(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(certificate, "_library", lambda lanes: None)
     given = solved(*CASES["pr2"])
-    bare = KeyframeCertificate(PR2_SCENE)
-    monkeypatch.setattr(keyframes, "certificate_of", lambda scene: bare)
+    keyframes._site.cache_clear()
     with World(PR2_SCENE) as world:
         looked = Mock(wraps=world.penetrations)
         monkeypatch.setattr(world, "penetrations", looked)

@@ -26,6 +26,7 @@ from guided_lgp.faults import Document, brief, refuse_unknown, validated
 from guided_lgp.logic import State, Symbols
 from guided_lgp.poses import Array, compose, pose, quaternion
 from guided_lgp.robots import Robot, load_robot, tilted_robot
+from guided_lgp.robots.mounted import Mounted
 from guided_lgp.scene.bodies import Angle, Body, Box, Coordinate, Obstacle, Table
 from guided_lgp.scene.grasps import grasp_at_start, is_given
 from guided_lgp.scene.shapes import Convex
@@ -116,8 +117,7 @@ class PlacedRobot(BaseModel):
             q: motion (T, n) in rad.
             links: names in the URDF; the fingers are at zero.
         """
-        kinematics = self.description.kinematics
-        return compose(self.base_pose, kinematics.link_poses(q, self.fixed_values, links))
+        return self.mounted.link_poses(q, links)
 
     def tool_pose(self, q: Array, gripper: str) -> Array:
         """Pose (7,) of a gripper's tool frame in the world at a configuration q (n,)."""
@@ -125,15 +125,12 @@ class PlacedRobot(BaseModel):
 
     def tool_poses(self, q: Array, grippers: Sequence[str] | None = None) -> dict[str, Array]:
         """Poses (T, 7) of tool frames, by default of all, along a motion q (T, n), by gripper."""
-        arms = self.description.arms
-        wanted = tuple(arms) if grippers is None else grippers
-        poses = self.link_poses(q, [arms[gripper].tool_link for gripper in wanted])
-        return {
-            gripper: links
-            if arms[gripper].tool_is_link
-            else compose(links, arms[gripper].tool_in_link)
-            for gripper, links in zip(wanted, poses.transpose(1, 0, 2), strict=True)
-        }
+        return self.mounted.tool_poses(q, grippers)
+
+    @property
+    def mounted(self) -> Mounted:
+        """The same, to be kept by who asks often."""
+        return Mounted(self.description, self.base_pose, self.fixed_values)
 
     @model_validator(mode="before")
     @classmethod

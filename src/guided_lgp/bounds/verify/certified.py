@@ -5,7 +5,6 @@ What is not certified is for PyBullet to judge, so a verdict is the same with th
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from functools import lru_cache
 from itertools import combinations
 from typing import Protocol
 
@@ -126,9 +125,3 @@ def _pairs(robot: Robot, names: Sequence[str], boxes: Sequence[str]) -> Iterator
         related = one == other or parents.get(one) == other or parents.get(other) == one
         if {one, other} & moving and not related and frozenset((one, other)) not in disabled:
             yield first, second
-
-
-@lru_cache(maxsize=8)
-def certificate_of(scene: Scene) -> KeyframeCertificate:
-    """The certificate of a scene; it takes some milliseconds to make."""
-    return KeyframeCertificate(scene)

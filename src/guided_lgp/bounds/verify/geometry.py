@@ -61,8 +61,12 @@ def grasp_faults(
 
 def stacks(boxes: Mapping[str, Pose], support: Mapping[str, str]) -> dict[str, Stack]:
     """All that it depends on whether boxes stand: a support, and boxes with all that they carry."""
+    loaded = set(support.values())
+    carried = {
+        box: balanced.whole_stack(box, support) if box in loaded else (box,) for box in support
+    }
     return {
-        box: (below, boxes.get(below), {n: boxes[n] for n in balanced.whole_stack(box, support)})
+        box: (below, boxes.get(below), {name: boxes[name] for name in carried[box]})
         for box, below in support.items()
     }
 

@@ -3,8 +3,9 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import accumulate, pairwise
+from operator import le
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -21,7 +22,7 @@ from guided_lgp.bounds.results import Array, Keyframe
 from guided_lgp.bounds.terms import carried
 from guided_lgp.bounds.terms.balanced import whole_stack
 from guided_lgp.bounds.terms.carried import relative
-from guided_lgp.bounds.verify.certified import certificate_of
+from guided_lgp.bounds.verify.certified import KeyframeCertificate
 from guided_lgp.bounds.verify.efforts import Load, overloads
 from guided_lgp.bounds.verify.geometry import (
     NOTHING,
@@ -43,6 +44,28 @@ _Grip = tuple[list[float], list[float]]
 """Poses of both."""
 
 
+class _Site:
+    """A scene, and what checks ask of it again and again: its hash takes longer than an answer."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene, self.robot = scene, scene.robot.description
+        self.kinematics = scene.robot.mounted
+        self.bodies, self.given = box_bodies(scene), given_grasps(scene)
+        self.certificate = KeyframeCertificate(scene)
+
+    @cached_property
+    def start(self) -> "_Reached":
+        """Before the first action."""
+        start = Keyframe(at_side(self.scene), poses_at_side(self.scene))
+        return _reached(self, [start], [(self.scene.state, self.scene.state)])[0]
+
+
+@lru_cache(maxsize=8)
+def _site(scene: Scene) -> _Site:
+    """It takes some milliseconds to make."""
+    return _Site(scene)
+
+
 def verify_keyframe(
     world: World, keyframe: Keyframe, state: State, action: Action | None = None
 ) -> list[Violation]:
@@ -60,48 +83,47 @@ def verify_keyframe(
         What is violated; nothing if the keyframe is good.
     """
     after = state if action is None else successor(state, action)
-    (reached,) = _reached(world.scene, [keyframe], [(state, after)])
-    (clear,) = certificate_of(world.scene).clear([reached])
-    return _faults(world, reached, clear)
+    site = _site(world.scene)
+    (reached,) = _reached(site, [keyframe], [(state, after)])
+    (clear,) = site.certificate.clear([reached])
+    return _faults(site, reached, None if clear else world)
 
 
 def _faults(
-    world: World, reached: "_Reached", clear: bool, last: "_Reached | None" = None
+    site: _Site, reached: "_Reached", world: World | None, last: "_Reached | None" = None
 ) -> list[Violation]:
-    """What is violated in a keyframe, of which it may be certain that nothing collides.
+    """What is violated in a keyframe; without a world, it is certain that nothing collides.
 
     What is as it was in the last keyframe has been found good there.
     """
     if not reached.is_finite:
         return [Violation("finite pose", math.nan)]
-    scene = world.scene
-    violations = joint_limit_faults(scene.robot.description, reached.keyframe.q)
-    violations += _grasp_faults(scene, reached, {} if last is None else last.grips)
+    violations = joint_limit_faults(site.robot, reached.keyframe.q)
+    violations += _grasp_faults(site, reached, {} if last is None else last.grips)
     good = NOTHING if last is None else last.stacks
     reached.stacks = stacks(reached.boxes, reached.support)
     changed = [box for box, stack in reached.stacks.items() if good.get(box) != stack]
     if changed:
-        violations += placement_faults(scene, reached.boxes, reached.support, changed)
-    violations += _effort_faults(scene, reached)
-    return violations if clear else violations + _collisions(world, reached)
+        violations += placement_faults(site.scene, reached.boxes, reached.support, changed)
+    violations += _effort_faults(site, reached)
+    return violations if world is None else violations + _collisions(world, reached)
 
 
-def _grasp_faults(
-    scene: Scene, reached: "_Reached", good: Mapping[_Pair, _Grip]
-) -> list[Violation]:
+def _grasp_faults(site: _Site, reached: "_Reached", good: Mapping[_Pair, _Grip]) -> list[Violation]:
     """Hands that do not hold their boxes; some grips have been found good before."""
     reached.grips = {
         pair: (reached.boxes[pair[0]], reached.tools[pair[1]]) for pair in reached.held
     }
     changed = [pair for pair, grip in reached.grips.items() if good.get(pair) != grip]
-    if not changed:
-        return []
-    bodies, given, arms = box_bodies(scene), given_grasps(scene), scene.robot.description.arms
     return [
         fault
         for box, gripper in changed
         for fault in grasp_faults(
-            arms[gripper], box, bodies[box], *reached.grips[box, gripper], given.get(box)
+            site.robot.arms[gripper],
+            box,
+            site.bodies[box],
+            *reached.grips[box, gripper],
+            site.given.get(box),
         )
     ]
 
@@ -139,14 +161,15 @@ def verify_keyframes(
     Returns:
         The first violation with its action, or None.
     """
-    last = _last_before(world.scene, skeleton[:verified], after_action[:verified])
+    site = _site(world.scene)
+    last = _last_before(site, skeleton[:verified], after_action[:verified])
     states = list(accumulate(skeleton[verified:], successor, initial=last.after))
     frames = [f for pair in zip(at_switch, after_action, strict=True) for f in pair][2 * verified :]
     modes = [(state, after) for before, after in pairwise(states) for state in (before, after)]
-    reached = _reached(world.scene, frames, modes)
-    clear = certificate_of(world.scene).clear(reached)
+    reached = _reached(site, frames, modes)
+    clear = site.certificate.clear(reached)
     for number, (now, is_clear) in enumerate(zip(reached, clear, strict=True)):
-        found = _faults(world, now, is_clear, last) or _slips(last, now)
+        found = _faults(site, now, None if is_clear else world, last) or _slips(last, now)
         if found:
             return replace(found[0], action=verified + number // 2)
         last = now
@@ -155,22 +178,15 @@ def verify_keyframes(
     return None
 
 
-def _last_before(scene: Scene, skeleton: Skeleton, after_action: Sequence[Keyframe]) -> "_Reached":
+def _last_before(site: _Site, skeleton: Skeleton, after_action: Sequence[Keyframe]) -> "_Reached":
     """The last keyframe that was checked before, after some actions, or else the start."""
     if not after_action:
-        return _start(scene)
+        return site.start
     actions, reached = _REACHED.get(after_action[-1], (None, None))
     if reached is not None and actions == skeleton:
         return reached
-    state = progress(scene.state, skeleton)
-    return _reached(scene, after_action[-1:], [(state, state)])[0]
-
-
-@lru_cache(maxsize=8)
-def _start(scene: Scene) -> "_Reached":
-    """Before the first action."""
-    start = Keyframe(at_side(scene), poses_at_side(scene))
-    return _reached(scene, [start], [(scene.state, scene.state)])[0]
+    state = progress(site.scene.state, skeleton)
+    return _reached(site, after_action[-1:], [(state, state)])[0]
 
 
 @lru_cache(maxsize=1024)
@@ -181,10 +197,11 @@ def _finger_value(fingers: Fingers, width: float, closed: bool) -> float:
 
 def joint_limit_faults(robot: Robot, q: Array) -> list[Violation]:
     """Joints of a configuration (n,) outside their limits."""
-    bounds = list(zip(*_limits(robot), q.tolist(), strict=True))
-    if all(low <= value <= high for low, high, value in bounds):
+    values, (lowest, highest) = q.tolist(), _limits(robot)
+    if all(map(le, lowest, values)) and all(map(le, values, highest)):
         return []
-    excess = [max(low - value, value - high) for low, high, value in bounds]
+    bounds = zip(lowest, values, highest, strict=True)
+    excess = [max(low - value, value - high) for low, value, high in bounds]
     return [
         Violation(f"joint limit {robot.joint_names[index]}", beyond)
         for index, beyond in enumerate(excess)
@@ -199,14 +216,14 @@ def _limits(robot: Robot) -> list[list[float]]:
     return limits
 
 
-def _effort_faults(scene: Scene, reached: "_Reached") -> list[Violation]:
+def _effort_faults(site: _Site, reached: "_Reached") -> list[Violation]:
     """Joints whose motor is too weak to rest in a keyframe."""
     loads = (
         Load(gripper, name, np.array(relative(reached.boxes[name], reached.tools[gripper])[0]))
         for box, gripper in reached.held
         for name in whole_stack(box, reached.support)
     )
-    return overloads(scene, reached.keyframe.q[None], loads)
+    return overloads(site.scene, reached.keyframe.q[None], loads)
 
 
 class _Reached:
@@ -214,7 +231,7 @@ class _Reached:
 
     def __init__(
         self,
-        scene: Scene,
+        site: _Site,
         keyframe: Keyframe,
         tools: dict[str, list[float]],
         state: State,
@@ -227,28 +244,36 @@ class _Reached:
         self.support = dict(state.support) | dict(after.support)
         self.stacks, self.grips = NOTHING, dict[_Pair, _Grip]()
         """Those that have been looked at."""
-        robot, bodies = scene.robot.description, box_bodies(scene)
+        self.relations: dict[_Pair, carried.Relative] = {}
+        """Of boxes and what carries them, as far as they have been asked for."""
         self.fingers: dict[str, float] = {}
         """Of the hands at boxes: on them, or open around them."""
         for box, gripper in self.held:
-            width = bodies[box].size[closing_axis(self.boxes[box], tools[gripper])]
+            width = site.bodies[box].size[closing_axis(self.boxes[box], tools[gripper])]
             keeps = (box, gripper) in state.held and (box, gripper) in after.held
-            self.fingers[gripper] = _finger_value(robot.arms[gripper].fingers, width, keeps)
+            self.fingers[gripper] = _finger_value(site.robot.arms[gripper].fingers, width, keeps)
 
     def carrier(self, name: str) -> list[float] | None:
         """The pose of a tool or box; of what never moves, none."""
         return self.tools.get(name) or self.boxes.get(name)
 
+    def relation(self, box: str, carrier: str) -> carried.Relative:
+        """Where a box is in what carries it."""
+        found = self.relations.get((box, carrier))
+        if found is None:
+            found = self.relations[box, carrier] = relative(self.boxes[box], self.carrier(carrier))
+        return found
+
 
 def _reached(
-    scene: Scene, keyframes: Sequence[Keyframe], modes: Sequence[tuple[State, State]]
+    site: _Site, keyframes: Sequence[Keyframe], modes: Sequence[tuple[State, State]]
 ) -> list[_Reached]:
     """Of all keyframes at once, where the tools are."""
-    poses = scene.robot.tool_poses(np.array([keyframe.q for keyframe in keyframes]))
+    poses = site.kinematics.tool_poses(np.array([keyframe.q for keyframe in keyframes]))
     tools = {gripper: rows.tolist() for gripper, rows in poses.items()}
     return [
         _Reached(
-            scene, keyframe, {gripper: rows[number] for gripper, rows in tools.items()}, *states
+            site, keyframe, {gripper: rows[number] for gripper, rows in tools.items()}, *states
         )
         for number, (keyframe, states) in enumerate(zip(keyframes, modes, strict=True))
     ]
@@ -263,8 +288,9 @@ def _slips(last: _Reached, reached: _Reached) -> list[Violation]:
     found = []
     for box, carrier in (*reached.state.held, *reached.state.support):
         before = last.boxes[box], last.carrier(carrier)
-        now = reached.boxes[box], reached.carrier(carrier)
-        amount = 0.0 if before == now else carried.check(relative(*before), relative(*now))
+        if before == (reached.boxes[box], reached.carrier(carrier)):
+            continue
+        amount = carried.check(last.relation(box, carrier), reached.relation(box, carrier))
         if amount > 0:
             found.append(Violation(f"carried {box} {carrier}", amount))
     return found
