@@ -112,6 +112,10 @@ class Variables:
     target: "array[float]"
 
 
+_UNKNOWN = array("d", [np.inf])
+"""Lever of an input."""
+
+
 class ProgramBuilder:
     """Collects variables, constants and kernel instances."""
 
@@ -188,7 +192,7 @@ class ProgramBuilder:
         self._kernel.append(number)
         self._slots.extend(inputs)
         self._parameters.extend(parameters)
-        self._levers.extend([np.inf] * len(inputs) if levers is None else levers)
+        self._levers.extend(_UNKNOWN * len(inputs) if levers is None else levers)
         self.instances.append(Instance(action, number, names, links))
 
     def number(self, kernel: str) -> int:

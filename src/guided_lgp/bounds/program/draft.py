@@ -82,7 +82,6 @@ def pose_values(
         variables: their number.
         pose: slots.
     """
-    x, y, yaw, z = (
-        values.item(slot if slot >= 0 else variables - 1 - slot) for slot in (*pose.plane, pose.z)
-    )
+    slots = (pose.x, pose.y, pose.yaw, pose.z)
+    x, y, yaw, z = [values.item(s if s >= 0 else variables - 1 - s) for s in slots]
     return x, y, yaw, z + pose.offset

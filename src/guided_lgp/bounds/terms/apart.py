@@ -1,5 +1,6 @@
 """``apart(gripper, gripper)``: the spheres of two arms keep their distance."""
 
+from array import array
 from collections.abc import Iterator
 from functools import cache
 from itertools import permutations, product
@@ -54,8 +55,13 @@ def keep_apart(
         ),
         ("apart", gripper, other),
         _links(one, two),
-        (*levers(one.chain, context.closed(gripper)), *levers(two.chain, context.closed(other))),
+        _levers(one.chain, context.closed(gripper), two.chain, context.closed(other)),
     )
+
+
+@cache
+def _levers(one: Chain, closed: float, other: Chain, others_closed: float) -> "array[float]":
+    return array("d", levers(one, closed) + levers(other, others_closed))
 
 
 @cache

@@ -59,26 +59,28 @@ def _add(context: Context, box: str, support: str) -> None:
 def _rows(context: Context, stack: tuple[str, ...], support: str) -> None:
     kernel_name, most = next(sums for sums in SUMS.items() if sums[1] >= len(stack))
     masses = tuple(context.geometry.bodies[name].mass for name in stack)
-    shares = (*_shares(masses), *[0.0] * (most - len(stack)))
-    points = [slot for name in stack for slot in context.pose[name].plane[:2]]
-    points += [ZERO] * (2 * most - len(points))
+    inputs = list(context.pose[support].plane)
+    for name in stack:
+        inputs += (context.pose[name].x, context.pose[name].y)
+    inputs += [ZERO] * (2 * (most - len(stack)))
     context.rows(
         kernel_name,
-        (*context.pose[support].plane, *points),
-        (*inner(context, support, _height(context, stack[0])), *shares),
+        inputs,
+        (*inner(context, support, _height(context, stack[0])), *_shares(masses, most)),
         ("balanced", stack[0], support),
     )
 
 
 @lru_cache(maxsize=256)
-def _shares(masses: tuple[float, ...]) -> tuple[float, ...]:
-    """Of the sum of some masses."""
-    return tuple((np.array(masses) / np.sum(masses)).tolist())
+def _shares(masses: tuple[float, ...], most: int) -> tuple[float, ...]:
+    """Of the sum of some masses; 0 for what is missing to so many."""
+    shares = (np.array(masses) / np.sum(masses)).tolist()
+    return (*shares, *[0.0] * (most - len(masses)))
 
 
 def _height(context: Context, box: str) -> float:
     """Of a box with all that it carries (m)."""
-    above = (_height(context, other) for other in context.after.standing_on(box))
+    above = [_height(context, other) for other in context.after.standing_on(box)]
     return 2 * context.half(box)[2] + max(above, default=0.0)
 
 

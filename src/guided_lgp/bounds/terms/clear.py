@@ -2,7 +2,7 @@
 
 from array import array
 from collections.abc import Iterable
-from functools import partial
+from functools import lru_cache, partial
 from math import hypot
 from typing import Any
 
@@ -58,16 +58,30 @@ def surroundings(context: Context, gripper: str, bodies: Iterable[str]) -> Insta
     arm, closed = context.robot.arms[gripper], context.closed(gripper)
     number = context.program.number(f"clear_{arm.chain.name}")
     own, reach = (*context.arm_parameters(arm), closed), levers(arm.chain, closed)
-    found = Instances([], array("i"), [], array("d"), array("d"))
-    for body in bodies:
-        pose, (x, y, z) = context.pose[body], context.half(body)
-        names = ("clear", gripper, body)
-        found.meanings.append(Instance(context.action, number, names, arm.links))
-        found.kernel.append(number)
-        found.inputs.append((pose.x, pose.y, pose.yaw, pose.z))
-        found.parameters.extend((*own, pose.offset, x, y, z, context.margins.clear))
-        found.levers.extend((*reach, SCALE, SCALE, SCALE * hypot(x, y), SCALE))
-    return found
+    names = tuple(bodies)
+    poses = [context.pose[name] for name in names]
+    places = tuple([(context.pose[name].offset, *context.half(name)) for name in names])
+    return Instances(
+        [Instance(context.action, number, ("clear", gripper, name), arm.links) for name in names],
+        array("i", [number]) * len(names),
+        [(*pose.plane, pose.z) for pose in poses],
+        *_numbers(own, reach, places, context.margins.clear),
+    )
+
+
+@lru_cache(maxsize=1024)
+def _numbers(
+    own: tuple[float, ...],
+    reach: tuple[float, ...],
+    places: tuple[tuple[float, ...], ...],
+    margin: float,
+) -> tuple["array[float]", "array[float]"]:
+    """Parameters and levers of an arm and bodies: they stand at few heights, in all skeletons."""
+    parameters, ways = array("d"), array("d")
+    for offset, x, y, z in places:
+        parameters.extend((*own, offset, x, y, z, margin))
+        ways.extend((*reach, SCALE, SCALE, SCALE * hypot(x, y), SCALE))
+    return parameters, ways
 
 
 def _add(context: Context, gripper: str, body: str) -> None:

@@ -61,11 +61,12 @@ class Placement:
         if self.aim is not None:
             places = self.aim(draft.generator, CANDIDATES, np.array((x, y, turn, z)))
             return np.column_stack([places, np.full(CANDIDATES, height)])
-        local = (draft.generator.uniform(-1, 1, (CANDIDATES, 2)) * self.half).tolist()
+        local = draft.generator.uniform(-1, 1, (CANDIDATES, 2)).tolist()
         yaws = draft.generator.uniform(-np.pi / 2, np.pi / 2, CANDIDATES).tolist()
-        cosine, sine = math.cos(turn), math.sin(turn)
+        cosine, sine, (half_along, half_across) = math.cos(turn), math.sin(turn), self.half
         candidates = []
-        for (along, across), yaw in zip(local, yaws, strict=True):
+        for shares, yaw in zip(local, yaws, strict=True):
+            along, across = shares[0] * half_along, shares[1] * half_across
             there = x + cosine * along - sine * across, y + sine * along + cosine * across
             candidates.append((*there, yaw, height))
         return np.array(candidates)
