@@ -14,6 +14,7 @@ from guided_lgp.bounds.coordination.schedule import schedule
 from guided_lgp.bounds.coordination.timetable import Timetable
 from guided_lgp.bounds.deadline import NEVER, Deadline, OutOfTimeError
 from guided_lgp.bounds.goals import NO_TERMS, GoalTerms
+from guided_lgp.bounds.path.bound import ITERATIONS
 from guided_lgp.bounds.path.motions import Mover
 from guided_lgp.bounds.path.situation import situation_at_start
 from guided_lgp.bounds.results import PathResult
@@ -22,10 +23,10 @@ from guided_lgp.logic import Skeleton
 from guided_lgp.scene import Scene
 from guided_lgp.scene.world import world_of
 
-_ITERATIONS = 150
-"""Samples of the sampling planner per motion, as of the path bound."""
 _ATTEMPTS = 5
 """Schedules that are looked at, each without the faults of those before."""
+_OF_CONTACTS = ("hold", "pads", "stand", "balanced")
+"""Faults of where bodies are in hands or on others: no manner of moving there mends them."""
 
 
 class Coordinator:
@@ -56,7 +57,7 @@ class Coordinator:
     @cached_property
     def _mover(self) -> Mover:
         """Made when first needed: most searches end without a path."""
-        return Mover(self._scene, _ITERATIONS, self._deadline, self._clearance)
+        return Mover(self._scene, ITERATIONS, self._deadline, self._clearance)
 
     def shorten(self, result: PathResult) -> PathResult:
         """The same actions in less time; actions of two arms may change places.
@@ -76,14 +77,18 @@ class Coordinator:
         for manner in MANNERS:
             with suppress(OutOfTimeError):
                 motion = self._scheduled(result.skeleton, plan, manner)
+                if isinstance(motion, Violation):
+                    break
                 if motion is not None:
                     elapsed = result.time_s + time.perf_counter() - began
                     return replace(motion, steps=result.steps, time_s=elapsed)
         return result
 
-    def _scheduled(self, skeleton: Skeleton, plan: Itinerary, manner: Manner) -> PathResult | None:
+    def _scheduled(
+        self, skeleton: Skeleton, plan: Itinerary, manner: Manner
+    ) -> PathResult | Violation | None:
         """A verified motion by the ways of all arms, which are apart also between rows if a few
-        attempts find such a one.
+        attempts find such a one; or what keeps every manner from having one.
         """
         busy = sum(len(stops) > 1 for stops in plan.stops.values())
         roads = {
@@ -100,6 +105,8 @@ class Coordinator:
             timetable = Timetable(self._scene, roads, plan, found)
             motion = self._verified(skeleton, timetable)
             if isinstance(motion, Violation):
+                if motion.constraint.startswith(_OF_CONTACTS):
+                    return near or motion
                 if isnan(motion.time):
                     break  # what is wrong is nothing that another moment would mend
                 moments.block(found[timetable.row_at(motion.time)])

@@ -48,6 +48,11 @@ class Moments:
         self._placed: dict[frozenset[int], Bodies] = {}
         self._scenes: dict[tuple[frozenset[int], frozenset[int]], PlanningScene] = {}
 
+    @property
+    def actions(self) -> int:
+        """How many all arms have to carry out."""
+        return len(self._plan.changes)
+
     def clear(self, start: Moment, ticks: int) -> bool:
         """Whether all arms go on from a moment for some ticks without a collision."""
         known, place = self._known(start)

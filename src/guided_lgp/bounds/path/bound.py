@@ -24,7 +24,7 @@ from guided_lgp.logic import Skeleton
 from guided_lgp.scene import Scene
 from guided_lgp.scene.world import world_of
 
-_ITERATIONS = 150
+ITERATIONS = 150
 """Samples of the sampling planner per motion."""
 _QUERIES = 250
 """Collision queries per action (and for four more) and coarse solution: of 108 found motions, 98 %
@@ -78,7 +78,7 @@ class PathBound:
         self._solutions = solutions
         self._goals = goals
         self._firm, self._shorten, self._clock = firm, shorten, clock
-        self._mover = Mover(scene, _ITERATIONS, deadline, clearance)
+        self._mover = Mover(scene, ITERATIONS, deadline, clearance)
         self._grips = {
             (gripper, box.name): grips_of(box, arm)
             for gripper, arm in self._mover.robot.arms.items()
