@@ -3,11 +3,13 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import accumulate, pairwise
 from types import TracebackType
 
 import numpy as np
 
 from guided_lgp.bounds.checks import Violation, box_bodies
+from guided_lgp.bounds.execution.clock import stops_at
 from guided_lgp.bounds.execution.conditions import AS_PLANNED, Conditions
 from guided_lgp.bounds.execution.forces import grips_of
 from guided_lgp.bounds.execution.hands import closing_rows, opening_rows
@@ -141,7 +143,9 @@ class Execution:
             (grip.gripper, grip.box, grip.start): self._conditions.force or grip.force
             for grip in grips_of(scene, skeleton, rows, trajectory)
         }
-        self._simulation.load(trajectory)
+        pressing = self._conditions.grip == "friction"
+        taken = _rows_of_grasps(scene.state, skeleton, rows) if pressing else []
+        self._simulation.load(trajectory, stops_at(self._robot, trajectory, taken))
         for box, gripper in sorted(scene.held.items()):
             if (gripper, box) not in self._held:
                 self._reach(gripper, box)
@@ -332,6 +336,13 @@ class Execution:
             return False
         normals = self._simulation.normals(box, support)
         return bool(normals) and min(normals) > UPRIGHT
+
+
+def _rows_of_grasps(state: State, skeleton: Skeleton, rows: Sequence[int]) -> list[int]:
+    """At which hands have closed on what they take."""
+    states = list(accumulate(skeleton, successor, initial=state))
+    changes = zip(rows, pairwise(states), strict=True)
+    return [row for row, (before, after) in changes if set(after.held) - set(before.held)]
 
 
 def _require_fingers(scene: Scene) -> None:

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from guided_lgp.bounds.checks import GRAVITY
+from guided_lgp.bounds.execution.clock import Stop, moments
 from guided_lgp.bounds.execution.conditions import Conditions
 from guided_lgp.bounds.results import Array, Trajectory
 from guided_lgp.bounds.verify.efforts import own_weights
@@ -20,8 +21,6 @@ ITERATIONS = 150
 """Of the contact solver, in each step."""
 SETTLE_S = 1.0
 """How long (s) the world rests before the first motion and after the last."""
-GRIP_S = 0.25
-"""How long (s) a hand waits after its fingers have closed: until they press."""
 _FINGER_FORCE, _FIXED_FORCE = 100.0, 1e5
 """Largest force (N or Nm) of the joints of hands, and of those that the scene fixes."""
 _STRONGEST = 1000.0
@@ -51,20 +50,21 @@ class Simulation:
         self._rub(float(np.sqrt(conditions.friction)))
         self._hold_other_joints()
 
-    def load(self, trajectory: Trajectory) -> None:
-        """Get ready to follow a motion from its start."""
-        moments = np.arange(int(np.ceil(trajectory.times[-1] * self._rate)) + 1) / self._rate
+    def load(self, trajectory: Trajectory, stops: Sequence[Stop] = ()) -> None:
+        """Get ready to follow a motion from its start, with some stops on the way."""
+        self._moments = moments(float(trajectory.times[-1]), stops, self._rate)
         values = trajectory.joints(self._robot.moving_joints)
         self._targets = np.stack(
-            [np.interp(moments, trajectory.times, joint) for joint in values.T], axis=1
+            [np.interp(self._moments, trajectory.times, joint) for joint in values.T], axis=1
         )
         self._motors = self._efforts()
         self._step = 0
         self._share_motors()
 
     def follow(self, time: float) -> None:
-        """Drive the joints along the motion until a moment (s)."""
-        while self._step < min(round(time * self._rate), len(self._targets) - 1):
+        """Drive the joints along the motion until a moment (s) of it."""
+        last = int(np.searchsorted(self._moments, time - 1e-9))
+        while self._step < min(last, len(self._targets) - 1):
             self._step += 1
             self._drive((self._targets[self._step] - self._targets[self._step - 1]) * self._rate)
 
@@ -109,7 +109,6 @@ class Simulation:
         """Let the fingers press with a force (N) from now on, whatever the motion says."""
         self._squeezing[gripper] = force
         self._share_motors()
-        self.rest(GRIP_S)
 
     def relax(self, gripper: str, box: str) -> None:
         """Let the fingers follow the motion again, and go from the box that they pressed on.
