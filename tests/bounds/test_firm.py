@@ -1,6 +1,7 @@
 """Of several motions the one whose grips hold is taken."""
 
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,10 +9,12 @@ import pytest
 from guided_lgp.bounds.checks import box_bodies
 from guided_lgp.bounds.execution.forces import grips_of
 from guided_lgp.bounds.path.firm import firmest
+from guided_lgp.bounds.plan_file import write_plan
 from guided_lgp.bounds.results import CoarseResult, PathResult
 from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.bounds.terms.steady import RATIO, check
 from guided_lgp.bounds.verify.attachments import switches_of
+from guided_lgp.cli.app import main
 from guided_lgp.logic import parse_skeleton
 from guided_lgp.params import load_planning
 from guided_lgp.scene.generate import generate
@@ -51,9 +54,21 @@ def test_a_grip_that_does_not_hold_is_refused_by_name() -> None:
     assert firmest(SCENE, iter([])) is None
 
 
+def test_a_foreign_plan_whose_grip_does_not_hold_is_not_carried_out(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "plan.json"
+    write_plan(file, SCENE, (), motion(firm=False), {})
+    with pytest.raises(SystemExit) as ended:
+        main(("execute", str(file), "--grip", "friction"))
+    assert ended.value.code == 2
+    (line,) = capsys.readouterr().err.strip().splitlines()
+    assert "plan.json: is not carried out: grip pr2R red by " in line
+
+
 def test_the_firmest_is_taken_where_none_holds_firmly(monkeypatch: pytest.MonkeyPatch) -> None:
     loose = motion(firm=False)
-    monkeypatch.setattr("guided_lgp.bounds.path.firm.MOST", load(loose))
+    monkeypatch.setattr("guided_lgp.bounds.execution.forces.MOST", load(loose))
     found = firmest(SCENE, iter([loose]))
     assert found is not None
     assert found.trajectory is loose.trajectory

@@ -65,6 +65,7 @@ def execute(
     """
     from guided_lgp.bounds.execution import Conditions
     from guided_lgp.bounds.execution import execute as simulate
+    from guided_lgp.bounds.execution.forces import chosen_grips, loosest
     from guided_lgp.bounds.goals import GoalTerms
     from guided_lgp.bounds.plan_file import read_plan
     from guided_lgp.bounds.verify import verify_path
@@ -78,6 +79,9 @@ def execute(
     goals = GoalTerms.of(course.objective, scene.symbols.domain)
     with spinner("verifying"):
         fault = verify_path(world_of(scene), skeleton, trajectory, goals).violation
+        if fault is None and conditions.grip == "friction":
+            worst = loosest(chosen_grips(scene, skeleton, trajectory))
+            fault = None if worst is None else worst.fault
     if fault is not None:
         raise InputError(str(plan_file), f"is not carried out: {fault}", "a plan that is verified")
     clearance = clearance_of(scene, skeleton, trajectory)

@@ -5,10 +5,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from guided_lgp.bounds.checks import GRAVITY, box_bodies, box_sizes, closing_axis, volumes
+from guided_lgp.bounds.checks import (
+    GRAVITY,
+    Violation,
+    box_bodies,
+    box_sizes,
+    closing_axis,
+    volumes,
+)
 from guided_lgp.bounds.results import Array, Attachment, Trajectory
 from guided_lgp.bounds.terms.steady import FRICTION, RATIO, on_box
-from guided_lgp.bounds.verify.attachments import spans
+from guided_lgp.bounds.verify.attachments import spans, switches_of
 from guided_lgp.bounds.verify.efforts import Carried, carried_boxes, derivatives
 from guided_lgp.logic import Skeleton
 from guided_lgp.poses import IDENTITY, compose, inverse, rotate
@@ -46,6 +53,12 @@ class Grip:
         """N from either side that would just hold the load."""
         return self.ratio * self.force
 
+    @property
+    def fault(self) -> Violation | None:
+        """That the box would turn or slip, if it would."""
+        excess = self.ratio - MOST
+        return Violation(f"grip {self.gripper} {self.box}", excess) if excess > 0 else None
+
 
 def grips_of(
     scene: Scene, skeleton: Skeleton, switches: Sequence[int], trajectory: Trajectory
@@ -72,6 +85,19 @@ def grips_of(
         _grip(scene, span, loads, tools[span.gripper], trajectory.times)
         for span in sorted(held, key=lambda span: (span.start, span.gripper))
     ]
+
+
+def chosen_grips(scene: Scene, skeleton: Skeleton, trajectory: Trajectory) -> list[Grip]:
+    """The grips that a verified motion chooses: what is held at the start has its grip there."""
+    switches = switches_of(scene, skeleton, trajectory)
+    assert isinstance(switches, list)
+    grips = grips_of(scene, skeleton, switches, trajectory)
+    return [grip for grip in grips if grip.start > 0]
+
+
+def loosest(grips: Sequence[Grip]) -> Grip | None:
+    """The grip whose pads have to carry most of what they can."""
+    return max(grips, key=lambda grip: grip.ratio, default=None)
 
 
 def _grip(

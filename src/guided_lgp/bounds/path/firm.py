@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
-from guided_lgp.bounds.execution.forces import MOST, Grip, grips_of
+from guided_lgp.bounds.execution.forces import Grip, chosen_grips, loosest
 from guided_lgp.bounds.results import Failure, PathResult
 from guided_lgp.bounds.terms.steady import RATIO
 from guided_lgp.bounds.verify.attachments import switches_of
@@ -29,9 +29,7 @@ def firmest(scene: Scene, motions: Iterator[PathResult]) -> PathResult | None:
             return loaded
         if best is None or worst.ratio < best[0].ratio:
             best = worst, loaded
-    if best is None or best[0].ratio <= MOST:
-        return best and best[1]
-    return _refused(scene, *best)
+    return best and _held(scene, *best)
 
 
 def firm_ones(scene: Scene, motions: Iterable[PathResult]) -> Iterator[PathResult]:
@@ -49,26 +47,22 @@ def _is_firm(grip: Grip) -> bool:
 def _loaded(scene: Scene, motion: PathResult) -> tuple[Grip | None, PathResult]:
     """The worst of the grips that a motion chooses, if any, and the motion with their load."""
     assert motion.trajectory is not None
-    grips = grips_of(scene, motion.skeleton, _switches(scene, motion), motion.trajectory)
-    chosen = [grip for grip in grips if grip.start > 0]
-    load = max((grip.need for grip in chosen), default=motion.load)
-    worst = max(chosen, key=lambda grip: grip.ratio, default=None)
-    return worst, replace(motion, load=load)
+    grips = chosen_grips(scene, motion.skeleton, motion.trajectory)
+    load = max((grip.need for grip in grips), default=motion.load)
+    return loosest(grips), replace(motion, load=load)
 
 
-def _refused(scene: Scene, grip: Grip, motion: PathResult) -> PathResult:
-    """A motion with a grip whose pads would slip."""
+def _held(scene: Scene, worst: Grip, motion: PathResult) -> PathResult:
+    """A motion, or where it would let a box slip."""
+    assert motion.trajectory is not None
+    if worst.fault is None:
+        return motion
+    switches = switches_of(scene, motion.skeleton, motion.trajectory)
+    assert isinstance(switches, list)
     failure = Failure(
-        action=_switches(scene, motion).index(grip.start),
-        constraint=f"grip {grip.gripper} {grip.box}",
-        violation=grip.ratio - MOST,
+        action=switches.index(worst.start),
+        constraint=worst.fault.constraint,
+        violation=worst.fault.amount,
         tried="motions of several coarse solutions",
     )
     return PathResult(motion.skeleton, feasible=False, failure=failure)
-
-
-def _switches(scene: Scene, motion: PathResult) -> list[int]:
-    assert motion.trajectory is not None
-    rows = switches_of(scene, motion.skeleton, motion.trajectory)
-    assert isinstance(rows, list)
-    return rows
