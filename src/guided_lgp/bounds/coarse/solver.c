@@ -37,16 +37,24 @@ static int find_places(const program *nlp, int *place)
     return moving;
 }
 
-/* The places of an instance's inputs that can move, and which inputs these are; their number. */
+/* The places of an instance's inputs that can move, in order, and which inputs these are; their
+ * number. */
 static int moving_inputs(const program *nlp, int i, const int *place, int *places, int *columns)
 {
     const int *inputs = nlp->inputs + nlp->input_start[i];
     int count = 0;
-    for (int j = 0; j < kernel_of(nlp, i)->inputs; j++)
-        if (inputs[j] < nlp->variables && place[inputs[j]] >= 0) {
-            places[count] = place[inputs[j]];
-            columns[count++] = j;
+    for (int j = 0; j < kernel_of(nlp, i)->inputs; j++) {
+        int found = inputs[j] < nlp->variables ? place[inputs[j]] : -1, at = count;
+        if (found < 0)
+            continue;
+        for (; at > 0 && places[at - 1] > found; at--) {
+            places[at] = places[at - 1];
+            columns[at] = columns[at - 1];
         }
+        places[at] = found;
+        columns[at] = j;
+        count++;
+    }
     return count;
 }
 
@@ -58,13 +66,10 @@ static size_t find_shape(const program *nlp, int n, const int *place, const char
     for (int k = 0; k < n; k++)
         first[k] = k;
     for (int i = 0; i < nlp->instances; i++) {
-        int count = active[i] ? moving_inputs(nlp, i, place, places, columns) : 0, smallest = n;
+        int count = active[i] ? moving_inputs(nlp, i, place, places, columns) : 0;
         for (int j = 0; j < count; j++)
-            if (places[j] < smallest)
-                smallest = places[j];
-        for (int j = 0; j < count; j++)
-            if (smallest < first[places[j]])
-                first[places[j]] = smallest;
+            if (places[0] < first[places[j]])
+                first[places[j]] = places[0];
     }
     size_t entries = 0;
     for (int k = 0; k < n; k++) {
@@ -103,16 +108,17 @@ static void linearise(const program *nlp, int n, const int *place, const double 
             double shifted = c[first + r] - multiplier[first + r] / penalty;
             if (!kernel->equality && shifted >= 0)
                 continue;
-            const double *row = jacobian + r * kernel->inputs;
+            double row[LARGEST_INPUT];
+            for (int a = 0; a < count; a++)
+                row[a] = jacobian[r * kernel->inputs + columns[a]];
             for (int a = 0; a < count; a++) {
-                double scaled = penalty * row[columns[a]];
+                double scaled = penalty * row[a];
                 if (scaled == 0)
                     continue;
                 g[places[a]] += scaled * shifted;
                 double *H_row = row_of(shape, H, places[a]);
-                for (int b = 0; b < count; b++)
-                    if (places[b] <= places[a])
-                        H_row[places[b]] += scaled * row[columns[b]];
+                for (int b = 0; b < count && places[b] <= places[a]; b++)
+                    H_row[places[b]] += scaled * row[b];
             }
         }
     }
