@@ -2,9 +2,9 @@
 
 import time
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from functools import cache, partial
+from functools import partial
 from itertools import accumulate
 
 import numpy as np
@@ -136,7 +136,7 @@ class CoarseBound:
         """The solution near one in which hands hold their load steadily; that one without any."""
         programs = self._programs(found.skeleton, self._steady)
         formulation = programs.built(0, found.variant)
-        random = _random(found.skeleton, 0)
+        random = _Random(found.skeleton, 0)
         start = self._starts.draw(formulation, random, noise=0.0, warm_start=found.values)
         solution = self._solver.solve(formulation.program, start, self._settings)
         steady = self._check(
@@ -217,7 +217,7 @@ class CoarseBound:
         """
         self._deadline.check()
         kept = prefix if number == 0 or number % 2 else None
-        random = _random(programs.skeleton, number)
+        random = _Random(programs.skeleton, number)
         variant = Variant() if kept is None else kept.variant
         variant = programs.variants.tried(number, random, variant)
         formulation = programs.built(number, variant)
@@ -301,14 +301,18 @@ def _begins_with(values: Array, prefix: Array | None) -> bool:
     return prefix is not None and np.array_equal(values[: len(prefix)], prefix)
 
 
-def _random(skeleton: Skeleton, number: int) -> Callable[[], np.random.Generator]:
+class _Random:
     """Random numbers of one start: of the skeleton and the number of the start only.
 
     Many starts need none, so that the generator is made when it is asked for.
     """
 
-    @cache
-    def generator() -> np.random.Generator:
-        return np.random.default_rng([zlib.crc32(format_skeleton(skeleton).encode()), number])
+    def __init__(self, skeleton: Skeleton, number: int) -> None:
+        self._skeleton, self._number = skeleton, number
+        self._generator: np.random.Generator | None = None
 
-    return generator
+    def __call__(self) -> np.random.Generator:
+        if self._generator is None:
+            seed = zlib.crc32(format_skeleton(self._skeleton).encode())
+            self._generator = np.random.default_rng([seed, self._number])
+        return self._generator

@@ -1,8 +1,7 @@
 """What is where at a point of a skeleton, in slots of a program: the mode tree with geometry."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -33,8 +32,7 @@ class Start(Protocol):
         ...
 
 
-@dataclass(frozen=True)
-class Line:
+class Line(NamedTuple):
     """A straight way of a hand to or from its contact: its far end (m)."""
 
     gripper: str

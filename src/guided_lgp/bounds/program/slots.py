@@ -3,7 +3,8 @@
 Slots of constants are negative until the number of variables is known.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import NamedTuple
 
 from guided_lgp.bounds.program.geometry import GraspSide
 
@@ -11,8 +12,7 @@ ZERO = -1
 """Slot of the constant 0."""
 
 
-@dataclass(frozen=True)
-class PlanarPose:
+class PlanarPose(NamedTuple):
     """Pose of a level body: slots of x, y, yaw and z in the values, and an offset of z (m)."""
 
     x: int
@@ -33,11 +33,10 @@ class PlanarPose:
 
     def raised(self, height: float) -> "PlanarPose":
         """The same place, higher (m)."""
-        return replace(self, offset=self.offset + height)
+        return self._replace(offset=self.offset + height)
 
 
-@dataclass(frozen=True)
-class StraightSegment:
+class StraightSegment(NamedTuple):
     """The far end of a straight way of the hand from a contact, the hand not turned."""
 
     joints: tuple[int, ...]
@@ -47,8 +46,7 @@ class StraightSegment:
     """How far it is up (m)."""
 
 
-@dataclass(frozen=True)
-class ArmConfiguration:
+class ArmConfiguration(NamedTuple):
     """An arm that holds a level body: the slots of its joints and the body's pose."""
 
     held: "HeldBox"
@@ -81,8 +79,7 @@ class HeldBox:
         return self.pitch, self.offset, self.depth
 
 
-@dataclass(frozen=True)
-class KeyframeSlots:
+class KeyframeSlots(NamedTuple):
     """Where everything is at one configuration: joint slots by gripper, and boxes."""
 
     joints: dict[str, tuple[int, ...] | None]

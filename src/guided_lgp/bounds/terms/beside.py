@@ -6,9 +6,8 @@ angle is a variable of the pair. What ends below the box, or begins above its wa
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from math import cos, sin
-from typing import Any
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -26,8 +25,7 @@ _TOUCH = 0.002
 """Heights (m) that differ by less are one."""
 
 
-@dataclass(frozen=True)
-class Separation:
+class Separation(NamedTuple):
     """Two level boxes beside each other, and the slot of the angle that separates them."""
 
     angle: int

@@ -243,7 +243,8 @@ def start(draft: Draft, held: HeldBox) -> None:
         return
     tried = _pitches(draft, held)
     if held.given is None and held.pitch >= draft.kept:
-        tried = tried + draft.noise * draft.generator.uniform(-_PITCH_SPREAD, _PITCH_SPREAD)
+        if draft.noise:
+            tried = tried + draft.noise * draft.generator.uniform(-_PITCH_SPREAD, _PITCH_SPREAD)
         costs = sum(
             _least_costs(draft, held, _place(draft, configuration), configuration.segments, tried)
             for configuration in configurations
