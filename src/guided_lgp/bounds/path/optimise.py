@@ -25,6 +25,7 @@ from itertools import groupby
 
 import numpy as np
 
+from guided_lgp.bounds.collision import PADDING
 from guided_lgp.bounds.path.motions import Motion, Mover, Transit
 from guided_lgp.bounds.path.quadratic import (
     NEIGHBOURS,
@@ -39,9 +40,8 @@ from guided_lgp.bounds.results import Array
 from guided_lgp.robots import Arm, PlacedArm
 
 CLEARANCE = 0.012
-"""Distance (m) of bodies at the waypoints, at least ..."""
-_BETWEEN = 0.002
-"""... and how much more (m) than is wished: between them a spline comes nearer."""
+"""Distance (m) of bodies at the waypoints of motions that keep ``PADDING``, and as much more as is
+wished beyond that: between waypoints a spline comes nearer."""
 ROUNDS = 5
 """Quadratic programs per motion, at most."""
 LEVEL = 0.01
@@ -147,7 +147,7 @@ def optimal_path(
     vertical = placed.forward(path[0])[0][2] if transit.keep_level else None
     limits, program = arm.limits, quadratic_program(mover.robot, arm.mirror_of or arm.gripper)
     enough = mover.room(transit.surroundings, path[[0, -1]], mover.clearance) - _NARROWER
-    clearance = max(CLEARANCE, mover.clearance + _BETWEEN)
+    clearance = CLEARANCE + (mover.clearance - PADDING)
     best: Array | None = None
     most = -np.inf
     for number in range(ROUNDS):
