@@ -4,7 +4,7 @@ import time
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 from itertools import accumulate
 
 import numpy as np
@@ -77,7 +77,6 @@ class CoarseBound:
         self._formulators = Formulators(self._geometry, goals)
         self._firm = firm
         self._steady = goals.held_steadily(scene.robot.description.grippers)
-        self._steady_formulators = Formulators(self._geometry, self._steady)
         self._starts = Starts(self._geometry, self._solver)
         self._decoder = Decoder(self._geometry)
         self._settings = Settings()
@@ -168,6 +167,11 @@ class CoarseBound:
                 yield result
             if found == count:
                 return
+
+    @cached_property
+    def _steady_formulators(self) -> Formulators:
+        """Only firm bounds need them."""
+        return Formulators(self._geometry, self._steady)
 
     def _programs(self, skeleton: Skeleton, goals: GoalTerms) -> Programs:
         steady = goals is self._steady
