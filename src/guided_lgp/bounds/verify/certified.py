@@ -21,7 +21,7 @@ from guided_lgp.scene.tolerances import MARGIN
 
 _SLACK = 0.004
 """How much less deep (m) than they may be certified bodies are: PyBullet makes its hulls 1 mm wider
-and measures depths too great, if anything."""
+and measures depths too great, if anything; single precision is off by 10 um at most."""
 
 _Pair = tuple[str, str]
 
