@@ -7,7 +7,7 @@ every stack is balanced. An arm stands at its side, except while the box that it
 others.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -189,10 +189,11 @@ class Formulator:
                 if joints is configuration.joints or other in context.standing:
                     keep_apart(context, gripper, joints, other, context.joints(other))
 
-    def _others(self, box: str) -> Iterator[str]:
+    def _others(self, box: str) -> list[str]:
         """All bodies but a box that are not at an arm's side."""
         context = self._context
-        return (n for n in context.geometry.bodies if n != box and not context.at_side(n))
+        away = {box, *filter(context.at_side, context.held)}
+        return [name for name in context.geometry.bodies if name not in away]
 
     def _keep_standing_arms_clear(self, actor: str, body: str) -> None:
         """Of what has been put down."""

@@ -17,7 +17,6 @@ from guided_lgp.bounds.program.draft import Draft
 from guided_lgp.bounds.program.kernels import SCALE, Kernel, absolute, kernel
 from guided_lgp.bounds.program.kinematics import RobotKinematics
 from guided_lgp.bounds.program.slots import PlanarPose
-from guided_lgp.bounds.results import Array
 from guided_lgp.bounds.terms.term import Term, put_down
 from guided_lgp.logic.declarations import Instruction, Variable
 
@@ -39,18 +38,16 @@ class Separation(NamedTuple):
             poses = draft.place(self.first), draft.place(self.second)
             draft.values[self.angle] = _separation(*poses, self.halves)[1]
 
-    def overlap(self, draft: Draft, first: Array) -> Array:
-        """How much (n,) in m the first box, if it stood there (n, 4), would overlap the second."""
+    def overlap(self, draft: Draft, first: Sequence[Sequence[float]]) -> list[float]:
+        """How much (m) the first box, if it stood at each of these places, would overlap."""
         second, (a, b, c, d) = draft.place(self.second), self.halves
         reach = math.hypot(a, b) + math.hypot(c, d)
-        return np.array(
-            [
-                max(0.0, -_separation(place, second, self.halves, enough=0.0)[0])
-                if math.dist(place[:2], second[:2]) < reach
-                else 0.0
-                for place in first.tolist()
-            ]
-        )
+        return [
+            max(0.0, -_separation(place, second, self.halves, enough=0.0)[0])
+            if math.dist(place[:2], second[:2]) < reach
+            else 0.0
+            for place in first
+        ]
 
 
 def _kernels(robot: RobotKinematics) -> tuple[Kernel, ...]:
@@ -71,20 +68,23 @@ def _add(context: Context, box: str, support: str | None = None) -> None:
     moved = (box, *context.state.carried_by(box))
     support = support or context.state.support_of(box)
     geometry = context.geometry
+    bodies = (*geometry.boxes, *geometry.supports, *geometry.obstacles)
+    others = [n for n in bodies if n not in moved and n != support and not context.at_side(n)]
+    rise = max((line.up for line in context.lines), default=0.0)
     for name in moved:
-        for other in (*geometry.boxes, *geometry.supports, *geometry.obstacles):
-            if other in moved or other == support or context.at_side(other):
-                continue
-            if _neighbours(context, name, other):
+        for other in others:
+            if _neighbours(context, name, other, rise):
                 _separate(context, name, other)
 
 
-def _neighbours(context: Context, name: str, other: str) -> bool:
-    """Whether a box has to be separated from another body: one may move, and their heights meet."""
+def _neighbours(context: Context, name: str, other: str, rise: float) -> bool:
+    """Whether a box has to be separated from another body: one may move, and their heights meet.
+
+    The box meets it on its way, a ``rise`` (m), too.
+    """
     first, second = context.pose[name], context.pose[other]
     if first.z != second.z or not (first.varies or second.varies):
         return False
-    rise = max((line.up for line in context.lines), default=0.0)
     apart = second.offset - first.offset
     reach = context.half(name)[2] + context.half(other)[2] - _TOUCH
     return -reach < apart < reach + rise

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from operator import add
 
 import numpy as np
 
@@ -73,11 +74,11 @@ class Placement:
 
     def _overlaps(self, draft: Draft, candidates: Array) -> Array:
         """Costs (CANDIDATES,) of what each candidate overlaps beside it."""
-        total = np.zeros(len(candidates))
+        total, places = [0.0] * len(candidates), candidates.tolist()
         for other in self.others:
             if isinstance(other, Separation) and other.first is self.pose:
-                total += other.overlap(draft, candidates)
-        return _OVERLAP * total
+                total = list(map(add, total, other.overlap(draft, places)))
+        return _OVERLAP * np.array(total)
 
     def _segments(self, draft: Draft) -> tuple[StraightSegment, ...]:
         """The straight segments of the arm that puts the box down."""
