@@ -29,7 +29,7 @@ _SHARE = 0.99
 _FINGER_SHARE = 0.97
 """Share of their velocity limit at which fingers move."""
 _REST = 2
-"""Ticks between two motions of one arm, so that jerks at their ends do not add up."""
+"""Ticks between two motions of one arm, at most: jerks at their ends do not add up then."""
 
 
 def jerk_limited(path: Array, arm: Arm, slower: float = 1.0) -> Array:
@@ -80,10 +80,13 @@ def ramp(fingers: Fingers, start: float, end: float) -> Array:
     return np.asarray(values)
 
 
-def _follow(motion: Motion, slower: float) -> tuple[Array, Array]:
+def _follow(motion: Motion, slower: float, before: Array) -> tuple[Array, Array]:
     rows = jerk_limited(motion.path, motion.arm, slower)
-    rest = _REST if len(rows) > 1 else 0
-    return _ticks(len(rows) + rest), np.pad(rows, ((rest, 0), (0, 0)), mode="edge")
+    for _ in range(_REST if len(rows) > 1 else 0):
+        if _excess(np.concatenate([before, rows[1:]]), motion.arm) <= 1.0:
+            break
+        rows = np.pad(rows, ((1, 0), (0, 0)), mode="edge")
+    return _ticks(len(rows)), rows
 
 
 def _ramp(fingers: Fingers, start: Array, value: float) -> tuple[Array, Array]:
@@ -122,7 +125,7 @@ def _means(samples: Array, window: int) -> Array:
     return np.asarray((sums[wide::_FINE] - sums[:-wide:_FINE]) / wide)
 
 
-def _excess(rows: Array, arm: Arm, slower: float) -> float:
+def _excess(rows: Array, arm: Arm, slower: float = 1.0) -> float:
     """The factor on time that brings rows (T, n) within the limits, before and after at rest.
 
     What is to be slower is so in velocity and acceleration: they are what tips a load.

@@ -31,13 +31,13 @@ CAREFUL = 3.0
 class Clock(NamedTuple):
     """When joints are where: times (T,) from 0 (s), and their values (T, n)."""
 
-    follow: Callable[[Motion, float], tuple[Array, Array]]
-    """An arm moves so many times slower than it could."""
+    follow: Callable[[Motion, float, Array], tuple[Array, Array]]
+    """An arm moves so many times slower than it could, after rows (m, n) without a rest."""
     ramp: Callable[[FingerJoints, Array, float], tuple[Array, Array]]
     """Fingers go from joint values (n,) to one value."""
 
 
-def _follow(motion: Motion, slower: float) -> tuple[Array, Array]:
+def _follow(motion: Motion, slower: float, before: Array) -> tuple[Array, Array]:
     times, values = motion.timed
     return slower * times, values
 
@@ -83,8 +83,9 @@ def assemble(
         match step:
             case Motion(arm):
                 stacked = sum(holder == arm.gripper for holder, _ in open_since.values()) > 1
-                moments, values = clock.follow(step, CAREFUL if stacked else pace)
                 columns = arm.slice
+                before = rows[-1][:, columns]
+                moments, values = clock.follow(step, CAREFUL if stacked else pace, before)
             case Fingers(gripper, value):
                 joints = robot.arms[gripper].fingers
                 columns = joints.slice
