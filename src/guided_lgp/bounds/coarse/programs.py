@@ -1,7 +1,5 @@
 """The programs of a scene's skeletons: each goes on where that of its prefix ends."""
 
-from functools import lru_cache
-
 from guided_lgp.bounds.coarse.formulation import Formulation, Formulator
 from guided_lgp.bounds.coarse.variants import Variant, Variants
 from guided_lgp.bounds.goals import GoalTerms
@@ -24,14 +22,23 @@ class Formulators:
 
     def __init__(self, geometry: SceneGeometry, goals: GoalTerms) -> None:
         self._begun = [Formulator(geometry, margins, goals.lasting) for margins in _MARGINS]
-        self.walked = lru_cache(_KEPT)(self._walked)
+        self._kept: dict[tuple[int, Skeleton, Variant], Formulator] = {}
+        """Those that were asked for last come last."""
 
-    def _walked(self, margins: int, skeleton: Skeleton, variant: Variant) -> Formulator:
+    def walked(self, margins: int, skeleton: Skeleton, variant: Variant) -> Formulator:
         """After a skeleton, with the margins of this number."""
         if not skeleton:
             return self._begun[margins]
-        *before, action = skeleton
-        prefix = self.walked(margins, tuple(before), variant.until(len(before)))
+        key = margins, skeleton, variant
+        found = self._kept.pop(key, None) or self._walk(*key)
+        self._kept[key] = found
+        if len(self._kept) > _KEPT:
+            del self._kept[next(iter(self._kept))]
+        return found
+
+    def _walk(self, margins: int, skeleton: Skeleton, variant: Variant) -> Formulator:
+        before, action = skeleton[:-1], skeleton[-1]
+        prefix = self.walked(margins, before, variant.until(len(before)))
         return prefix.after(action, *variant.at(len(before)))
 
 
