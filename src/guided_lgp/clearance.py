@@ -13,6 +13,7 @@ from guided_lgp.bounds.verify.phase import STEP, Phase
 from guided_lgp.bounds.verify.touching import touches
 from guided_lgp.errors import InputError
 from guided_lgp.logic import Skeleton, State, successor
+from guided_lgp.robots import Robot
 from guided_lgp.scene import Scene
 from guided_lgp.scene.world import World, initial_poses, world_of
 
@@ -24,8 +25,6 @@ FARTHEST = 0.1
 """m: nobody asks for more."""
 _SIGHT = 0.3
 """m up to which distances are measured: the farther off a body is, the longer it can be ignored."""
-_APPROACH = 2 * STEP
-"""m by which two bodies come nearer to each other from one sample to the next, at most."""
 _RESTING = 0.03
 """m of the hand's way up to which a box keeps no distance from what it stood on, or will stand on:
 as long as a straight way up."""
@@ -91,6 +90,10 @@ def clearance_of(scene: Scene, skeleton: Skeleton, trajectory: Trajectory) -> Cl
     return nearest
 
 
+_Pair = tuple[str, str]
+"""Two bodies."""
+
+
 @dataclass(frozen=True)
 class _Rest:
     """A box is lifted from a body, or put down on it, between two moments (s)."""
@@ -126,21 +129,34 @@ def _nearest_of(
     nearest: Clearance,
 ) -> Clearance:
     """The smallest clearance of a phase, if it is smaller than that of those before it."""
-    robot, due = world.scene.robot.description, dict[tuple[str, str], int]()
-    for sample in range(len(phase.q)):
-        boxes = phase.boxes_at(sample)
-        fingers = robot.finger_values(phase.q[sample])
-        world.set(phase.q[sample, : len(robot.joint_names)], boxes, fingers)
-        time = float(phase.times[sample])
+    robot = world.scene.robot.description
+    due, known = dict[_Pair, float](), dict[frozenset[_Pair], list[_Pair]]()
+    approach = _approach(robot, phase.q)
+    for sample, (time, gone) in enumerate(zip(phase.times.tolist(), approach, strict=True)):
         resting = {(r.box, r.body) for r in rests if r.start <= time <= r.end}
-        for part, body in _pairs(world, phase, touched[sample], resting):
-            if due.get((part, body), 0) > sample:
-                continue
+        apart = frozenset(touched[sample] | resting)
+        if apart not in known:
+            known[apart] = list(_pairs(world, phase, touched[sample], resting))
+        near = [pair for pair in known[apart] if due.get(pair, -1.0) < gone]
+        if not near:
+            continue
+        fingers = robot.finger_values(phase.q[sample])
+        world.set(phase.q[sample, : len(robot.joint_names)], phase.boxes_at(sample), fingers)
+        for part, body in near:
             distance = world.distance(part, body, _SIGHT)
             if distance < nearest.distance:
                 nearest = Clearance(distance, part, body, time)
-            due[part, body] = sample + 1 + int((distance - nearest.distance) / _APPROACH)
+            due[part, body] = gone + distance - nearest.distance
     return nearest
+
+
+def _approach(robot: Robot, q: Array) -> list[float]:
+    """How far (m) two bodies come nearer to each other up to samples (T, m), at most."""
+    changes = np.diff(q, axis=0) != 0.0
+    moving = [
+        changes[:, np.r_[arm.slice, arm.fingers.slice]].any(axis=1) for arm in robot.arms.values()
+    ]
+    return [0.0, *(STEP * np.cumsum(np.sum(moving, axis=0))).tolist()]
 
 
 def _pairs(
