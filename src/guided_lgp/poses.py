@@ -46,7 +46,7 @@ def compose(first: Array, second: Array) -> Array:
         return np.array(_compose_two(first.tolist(), second.tolist()))
     library = _library()
     if library is not None:
-        shape = np.broadcast_shapes(first.shape, second.shape)
+        shape = second.shape if first.ndim == 1 else np.broadcast_shapes(first.shape, second.shape)
         found = np.empty(shape)
         pair = _spread(first, shape), _spread(second, shape)
         library.compose(found.size // 7, *map(address, pair), address(found))

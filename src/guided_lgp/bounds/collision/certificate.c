@@ -311,24 +311,28 @@ static int split(const scene *s, const pose *poses, int a, int b, int lane, floa
 }
 
 /* Values (count, joints) in columns, poses (count, loose, 7), and which pairs (count, pairs) are not
- * looked at, to sure (count): whether all others are farther apart than their paddings. */
+ * looked at, to sure (count): whether all is finite and the others are farther apart than their
+ * paddings. */
 WIDEST void settle(const scene *s, int pairs, const int *pair, const float *padding, int count,
             const int *column, const double *values, const double *loose,
             const unsigned char *skip, unsigned char *sure)
 {
     float value[count * s->joints], sine[count * s->joints], versine[count * s->joints];
-    for (int row = 0, i = 0; row < count; row++)
+    for (int row = 0, i = 0; row < count; row++) {
+        double total = 0;
+        for (int k = 0; k < 7 * s->loose; k++)
+            total += loose[7 * row * s->loose + k];
         for (int j = 0; j < s->joints; j++, i++) {
-            value[i] = values[row * s->joints + column[j]];
+            total += value[i] = values[row * s->joints + column[j]];
             sine[i] = sinf(value[i]);
             versine[i] = 1 - cosf(value[i]);
         }
+        sure[row] = isfinite(total) != 0;
+    }
     pose joints[s->joints + s->loose], poses[s->bodies];
     for (int first = 0; first < count; first += LANES) {
         int rows = count - first < LANES ? count - first : LANES, unsure[LANES];
         place(s, first, count, value, sine, versine, loose, joints, poses);
-        for (int l = 0; l < rows; l++)
-            sure[first + l] = 1;
         for (int p = 0; p < pairs; p++) {
             int a = pair[2 * p], b = pair[2 * p + 1], wanted = 0;
             for (int l = 0; l < rows; l++)

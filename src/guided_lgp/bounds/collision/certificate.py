@@ -133,9 +133,9 @@ class Certificate:
         loose: Array,
         skipped: NDArray[np.bool_],
     ) -> NDArray[np.bool_]:
-        """In which configurations (m,) all pairs are surely apart; in none without a compiler.
+        """In which configurations (m,) all is finite and all pairs are surely apart.
 
-        Searches longer than :meth:`near`, where it has to.
+        In none without a compiler. Searches longer than :meth:`near`, where it has to.
 
         Args:
             values: see :meth:`near`; contiguous.

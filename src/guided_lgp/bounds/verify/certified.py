@@ -88,10 +88,9 @@ class KeyframeCertificate:
         skipped = np.zeros((len(moments), len(self._pairs)), dtype=np.bool_)
         for row, moment in zip(skipped, moments, strict=True):
             row[self._touching(moment)] = True
-        sure = self._certificate.apart(
+        clear: list[bool] = self._certificate.apart(
             values, self._pairs, self._padding, np.concatenate(places), skipped
-        )
-        clear: list[bool] = (sure & np.isfinite(values.sum(axis=1))).tolist()
+        ).tolist()
         return clear
 
     def _moving(self, moment: Moment) -> list[float]:
