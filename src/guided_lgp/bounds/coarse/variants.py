@@ -40,8 +40,11 @@ class Variants:
     """The choices that a skeleton leaves."""
 
     def __init__(self, geometry: SceneGeometry, skeleton: Skeleton) -> None:
-        self._geometry = geometry
-        self._grounds = [geometry.domain.bind(action) for action in skeleton]
+        self._geometry, self._skeleton = geometry, skeleton
+
+    @cached_property
+    def _grounds(self) -> list[GroundInstruction]:
+        return [self._geometry.domain.bind(action) for action in self._skeleton]
 
     @cached_property
     def _sides(self) -> list[int]:
@@ -73,7 +76,7 @@ class Variants:
         if number and number % 2 == 0:
             return Variant(_drawn(random(), self._sides), _drawn(random(), self._low))
         if number == 0:
-            first = (0,) * (len(self._grounds) - len(kept.sides))
+            first = (0,) * (len(self._skeleton) - len(kept.sides))
             return Variant(kept.sides + first, kept.low + first)
         turn, new = (number + 1) // 2, self._sides[len(kept.sides) :]
         sides = tuple(turn % count for count in new)
