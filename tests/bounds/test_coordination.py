@@ -24,7 +24,7 @@ from guided_lgp.bounds.path.motions import Mover
 from guided_lgp.bounds.path.situation import situation_at_start
 from guided_lgp.bounds.results import PathResult, Trajectory
 from guided_lgp.bounds.scene_bounds import SceneBounds
-from guided_lgp.bounds.verify import verify_path
+from guided_lgp.bounds.verify import PathReport, Violation, verify_path
 from guided_lgp.bounds.verify.attachments import switches_of
 from guided_lgp.bounds.verify.joints import rows_outside_limits
 from guided_lgp.clearance import CLEARANCE, clearance_of
@@ -246,6 +246,15 @@ def test_what_cannot_be_shortened_stays(apart: tuple[Scene, PathResult]) -> None
     scene, result = apart
     nothing = replace(result, skeleton=())
     assert Coordinator(scene).shorten(nothing) is nothing
+
+
+def test_no_other_manner_is_tried_where_a_contact_is_refused(
+    apart: tuple[Scene, PathResult], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene, result = apart
+    reports = iter([PathReport(Violation("balanced red green", 0.01, 1, 2.0))])
+    monkeypatch.setattr(coordinate, "verify_path", lambda *_: next(reports))
+    assert Coordinator(scene).shorten(result) is result
 
 
 @pytest.mark.parametrize("slower", [1.0, 3.0])
