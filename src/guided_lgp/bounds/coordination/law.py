@@ -19,9 +19,10 @@ from guided_lgp.robots.robot import Fingers
 TICK = 0.025
 """Time (s) between two rows: so little that a smooth curve through them, as controllers follow it,
 stays within a millimetre of the straight lines between them."""
-_WINDOWS = (4, 3, 2)
+_WINDOWS = (4, 8, 6, 3, 2)
 """Ticks over which configurations may be averaged: a jump from one acceleration limit to the other
-needs the first, which is the best most often; one by a single limit needs the last."""
+needs the first, which is the best most often; several in a row, on a path that winds, need more,
+and one by a single limit needs the last."""
 _FINE = 2
 """Samples per tick that are averaged."""
 _SHARE = 0.99
