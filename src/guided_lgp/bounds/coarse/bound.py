@@ -112,17 +112,11 @@ class CoarseBound:
         return CoarseSolution(**(vars(result) | {"time_s": elapsed}))
 
     def finish(self, result: CoarseResult) -> CoarseResult:
-        """The verdict on a skeleton at whose end the terms of the goals hold, from one without.
-
-        Of firm bounds the solution nearest to it in which hands hold their load steadily.
-        """
+        """The verdict on a skeleton at whose end the terms of the goals hold, from one without."""
         started = time.perf_counter()
         if result.feasible and self._goals.final:
             programs = self._programs(result.skeleton, self._goals)
             found = self._first_feasible(programs, None, programs.variants.starts(self._restarts))
-            result = replace(found, time_s=time.perf_counter() - started)
-        if isinstance(result, CoarseSolution) and result.feasible and self._loads(result.skeleton):
-            found = self._held_steadily(result)
             result = replace(found, time_s=time.perf_counter() - started)
         return result
 
@@ -131,8 +125,10 @@ class CoarseBound:
         states = accumulate(skeleton, successor, initial=self.scene.state)
         return self._firm and any(s.standing_on(box) for s in states for box, _ in s.held)
 
-    def _held_steadily(self, found: CoarseSolution) -> CoarseSolution:
-        """The solution near one in which hands hold their load steadily; that one without any."""
+    def steadier(self, found: CoarseResult) -> Iterator[CoarseResult]:
+        """Of firm bounds the solution near another one in which hands hold their load steadily."""
+        if not isinstance(found, CoarseSolution) or not self._loads(found.skeleton):
+            return
         programs = self._programs(found.skeleton, self._steady)
         formulation = programs.built(0, found.variant)
         random = _Random(found.skeleton, 0)
@@ -141,7 +137,8 @@ class CoarseBound:
         steady = self._check(
             programs, formulation, found.variant, solution, restarts=found.restarts, prefix=None
         )
-        return steady if steady.feasible else found
+        if steady.feasible:
+            yield steady
 
     def solutions(self, skeleton: Skeleton, count: int) -> Iterator[CoarseResult]:
         """Up to ``count`` further verified solutions, with the goals, from independent starts.

@@ -102,8 +102,9 @@ class PathBound:
         furthest = FurthestFailure()
         skeleton = coarse_result.skeleton
         others = self._coarse.solutions(skeleton, self._solutions)
-        solutions = islice(chain([coarse_result], others), self._solutions)
-        motions = self._motions(skeleton, solutions, furthest)
+        steadier = self._coarse.steadier(coarse_result)
+        solutions = islice(chain([coarse_result], steadier, others), self._solutions)
+        motions = self._motions(skeleton, solutions, furthest, coarse_result)
         found = firmest(self._scene, motions) if self._firm else next(motions, None)
         if found is None:
             found = _failed(skeleton, furthest)
@@ -116,9 +117,17 @@ class PathBound:
         return firm_ones(self._scene, motions) if self._firm else motions
 
     def _motions(
-        self, skeleton: Skeleton, solutions: Iterable[CoarseResult], furthest: FurthestFailure
+        self,
+        skeleton: Skeleton,
+        solutions: Iterable[CoarseResult],
+        furthest: FurthestFailure,
+        plain: CoarseResult | None = None,
     ) -> Iterator[PathResult]:
-        """Verified motions, one from each coarse solution that has one."""
+        """Verified motions, one from each coarse solution that has one.
+
+        Firm grips are looked for where those of the plain solution, which are the fastest as a
+        rule, do not hold.
+        """
         for number, solution in enumerate(solutions):
             furthest.tried = number + 1
             task = Task(
@@ -131,7 +140,7 @@ class PathBound:
                 number,
                 self._goals,
                 self._coarse.overhung,
-                self._firm,
+                self._firm and solution is not plain,
             )
             limit = self._mover.queries + _QUERIES * (len(skeleton) + 4)
             gathered = task.gathered()

@@ -25,7 +25,7 @@ FRICTION = 0.6
 """Coefficient of friction that grips are made for: cardboard on rubber."""
 RATIO = 0.5
 """Share of what the pads can carry that a load should take ..."""
-AT_REST = 0.4
+AT_REST = 0.38
 """... and at rest, so that its acceleration leaves that much."""
 _MOST = 8
 """Boxes that the sum of weights has room for; of more, the verdict on the motion judges."""
