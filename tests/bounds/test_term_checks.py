@@ -76,10 +76,14 @@ def test_hold(gripper: str) -> None:
         place = np.array([0.55, 0.2 * arm.side, rng.uniform(-1.5, 1.5), rng.uniform(0.5, 0.8)])
         pitch, offset = rng.uniform(0.4, 2.7), rng.uniform(-0.04, 0.04)
         depth = rng.uniform(PALM_GAP, 0.04)
-        joints, missing = ik(
-            held(gripper), (offset, depth), place[None], np.array([pitch]), np.zeros((1, 2))
+        (q,) = ik.hold(
+            held(gripper),
+            (offset, depth),
+            place[None],
+            np.array([pitch]),
+            np.zeros((1, 2)),
+            np.zeros,
         )
-        q = joints[0, 0, 0, np.argmin(missing[0, 0])].copy()
         q[rng.integers(7)] += rng.choice([0.0, 0.2])
         grasp = (HALF_LENGTH, HALF_HEIGHT, 0.0, 0.0)
         x = np.array([*q, pitch, offset, depth, *place])
