@@ -125,7 +125,7 @@ def _compiled_seconds() -> Iterator[list[float]]:
 
         return run
 
-    owners = [(Compiled, name) for name in ("solve", "holds", "least_costs")]
+    owners = [(Compiled, name) for name in ("solve", "hold", "least_costs")]
     with ExitStack() as patches:
         for owner, name in [*owners, *((pybullet, name) for name in NATIVE)]:
             patches.enter_context(patch.object(owner, name, timed(getattr(owner, name))))

@@ -30,6 +30,10 @@ _RESTING = 0.03
 as long as a straight way up."""
 
 
+_ALL = "all"
+"""Instead of a gripper: what one arm carries and another arm move both."""
+
+
 @dataclass(frozen=True)
 class Clearance:
     """The smallest distance of a moving part from a body that it does not touch."""
@@ -130,46 +134,56 @@ def _nearest_of(
 ) -> Clearance:
     """The smallest clearance of a phase, if it is smaller than that of those before it."""
     robot = world.scene.robot.description
-    due, known = dict[_Pair, float](), dict[frozenset[_Pair], list[_Pair]]()
-    approach = _approach(robot, phase.q)
-    for sample, (time, gone) in enumerate(zip(phase.times.tolist(), approach, strict=True)):
+    due, known = dict[_Pair, float](), dict[frozenset[_Pair], list[tuple[str, _Pair]]]()
+    ways = _ways(robot, phase.q)
+    for sample, time in enumerate(phase.times.tolist()):
+        gone = {mover: way[sample] for mover, way in ways.items()}
         resting = {(r.box, r.body) for r in rests if r.start <= time <= r.end}
         apart = frozenset(touched[sample] | resting)
         if apart not in known:
             known[apart] = list(_pairs(world, phase, touched[sample], resting))
-        near = [pair for pair in known[apart] if due.get(pair, -1.0) < gone]
+        near = [(g, pair) for g, pair in known[apart] if due.get(pair, -1.0) < gone[g]]
         if not near:
             continue
-        fingers = robot.finger_values(phase.q[sample])
-        world.set(phase.q[sample, : len(robot.joint_names)], phase.boxes_at(sample), fingers)
-        for part, body in near:
+        fingers, boxes = robot.finger_values(phase.q[sample]), phase.boxes_at(sample)
+        if sample:  # at first, everything is near
+            boxes = {box: boxes[box] for box in phase.grips}
+        world.set(phase.q[sample, : len(robot.joint_names)], boxes, fingers)
+        for mover, (part, body) in near:
             distance = world.distance(part, body, _SIGHT)
             if distance < nearest.distance:
                 nearest = Clearance(distance, part, body, time)
-            due[part, body] = gone + distance - nearest.distance
+            due[part, body] = gone[mover] + distance - nearest.distance
     return nearest
 
 
-def _approach(robot: Robot, q: Array) -> list[float]:
-    """How far (m) two bodies come nearer to each other up to samples (T, m), at most."""
+def _ways(robot: Robot, q: Array) -> dict[str, list[float]]:
+    """How far (m) an arm and what it carries come nearer to what stands still, up to samples
+    (T, m), at most; by gripper, and all arms together to each other.
+    """
     changes = np.diff(q, axis=0) != 0.0
-    moving = [
-        changes[:, np.r_[arm.slice, arm.fingers.slice]].any(axis=1) for arm in robot.arms.values()
-    ]
-    return [0.0, *(STEP * np.cumsum(np.sum(moving, axis=0))).tolist()]
+    moving = {
+        gripper: changes[:, np.r_[arm.slice, arm.fingers.slice]].any(axis=1)
+        for gripper, arm in robot.arms.items()
+    }
+    moving[_ALL] = np.sum(list(moving.values()), axis=0)
+    return {mover: [0.0, *(STEP * np.cumsum(rows)).tolist()] for mover, rows in moving.items()}
 
 
 def _pairs(
-    world: World, phase: Phase, touched: set[tuple[str, str]], resting: set[tuple[str, str]]
-) -> Iterator[tuple[str, str]]:
-    """Moving parts, and bodies that they do not touch."""
+    world: World, phase: Phase, touched: set[_Pair], resting: set[_Pair]
+) -> Iterator[tuple[str, _Pair]]:
+    """Moving parts, and bodies that they do not touch; with the gripper whose arm moves them."""
     scene, robot = world.scene, world.scene.robot.description
     bodies = [body.name for body in scene.bodies]
+    holders = {box: holder for box, (holder, _) in phase.grips.items()}
     for gripper, arm in robot.arms.items():
-        own = {box for box, (holder, _) in phase.grips.items() if holder == gripper}
+        own = {box for box, holder in holders.items() if holder == gripper}
         handled = own | {box for box, holder in touched if holder == gripper}
-        yield from ((link, body) for link in arm.links for body in bodies)
-        yield from ((link, b) for link in arm.hand_links for b in bodies if b not in handled)
-    for box in phase.grips:
-        others = (body for body in bodies if body not in phase.grips)
-        yield from ((box, body) for body in others if (box, body) not in resting)
+        for body in bodies:
+            links = arm.links if body in handled else (*arm.links, *arm.hand_links)
+            mover = gripper if holders.get(body, gripper) == gripper else _ALL
+            yield from ((mover, (link, body)) for link in links)
+    for box, gripper in holders.items():
+        others = (body for body in bodies if body not in holders)
+        yield from ((gripper, (box, body)) for body in others if (box, body) not in resting)
