@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from guided_lgp.bounds.collision import PADDING
-from guided_lgp.bounds.results import Array, Trajectory
+from guided_lgp.bounds.results import Array, PathResult, Trajectory
 from guided_lgp.bounds.verify.attachments import switches_of
 from guided_lgp.bounds.verify.phase import STEP, Phase
 from guided_lgp.bounds.verify.touching import touches
@@ -59,6 +59,13 @@ def check_clearance(clearance: float) -> None:
     if not PADDING <= clearance <= WIDEST:
         accepted = f"{PADDING:g} to {WIDEST:g}"
         raise InputError("clearance", f"{clearance:g} m is out of range", accepted)
+
+
+def clearance_of_path(scene: Scene, path: PathResult | None) -> Clearance | None:
+    """Where a plan's motion comes nearest to what it does not touch; None without a motion."""
+    if path is None or path.trajectory is None:
+        return None
+    return clearance_of(scene, path.skeleton, path.trajectory)
 
 
 def clearance_of(scene: Scene, skeleton: Skeleton, trajectory: Trajectory) -> Clearance:

@@ -12,7 +12,7 @@ from guided_lgp.bounds.goals import GoalTerms
 from guided_lgp.bounds.path.assembly import stay
 from guided_lgp.bounds.results import PathResult
 from guided_lgp.bounds.scene_bounds import SceneBounds
-from guided_lgp.clearance import CLEARANCE, Clearance, check_clearance, clearance_of
+from guided_lgp.clearance import CLEARANCE, Clearance, check_clearance, clearance_of_path
 from guided_lgp.domains import load_domain
 from guided_lgp.errors import InputError
 from guided_lgp.explanation import ObservedBounds, Obstacle, users_bounds
@@ -89,9 +89,7 @@ class PlanningResult(SearchResult):
     @cached_property
     def clearance(self) -> Clearance | None:
         """Where its motion comes nearest to what it does not touch; None without a motion."""
-        if self.path is None or self.path.trajectory is None:
-            return None
-        return clearance_of(self.scene, self.path.skeleton, self.path.trajectory)
+        return clearance_of_path(self.scene, self.path)
 
     @property
     def unexplained(self) -> bool:

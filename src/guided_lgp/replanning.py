@@ -27,7 +27,7 @@ from guided_lgp.bounds.plan_file import Plan
 from guided_lgp.bounds.results import PathResult, Trajectory
 from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.bounds.verify.attachments import switches_of
-from guided_lgp.clearance import CLEARANCE, Clearance, check_clearance, clearance_of
+from guided_lgp.clearance import CLEARANCE, Clearance, check_clearance, clearance_of_path
 from guided_lgp.errors import InputError
 from guided_lgp.logic import (
     Goal,
@@ -97,9 +97,7 @@ class Replanned:
     @cached_property
     def clearance(self) -> Clearance | None:
         """Where its motion comes nearest to what it does not touch; None without a motion."""
-        if self.path is None or self.path.trajectory is None:
-            return None
-        return clearance_of(self.scene, self.path.skeleton, self.path.trajectory)
+        return clearance_of_path(self.scene, self.path)
 
     @property
     def course(self) -> Course:
