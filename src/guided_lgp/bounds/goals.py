@@ -46,10 +46,14 @@ class GoalTerms:
             for term in self.postures
         }
 
-    def held_steadily(self, grippers: Iterable[str]) -> "GoalTerms":
-        """These, and that no load turns what grippers hold."""
-        steady = (GroundTerm("steady", (gripper,)) for gripper in grippers)
-        return replace(self, lasting=(*self.lasting, *steady))
+    def firmer(self, grippers: Iterable[str]) -> tuple["GoalTerms", "GoalTerms"]:
+        """These with what plans for users wish, first with most: nothing stands only by what it
+        carries, and no load turns what grippers hold; then the latter alone.
+        """
+        steady = tuple(GroundTerm("steady", (gripper,)) for gripper in grippers)
+        wishes = (GroundTerm("unaided", ()), *steady), steady
+        unaided, held = (replace(self, lasting=(*self.lasting, *wish)) for wish in wishes)
+        return unaided, held
 
     def about(self, box: str) -> "GoalTerms":
         """Those at the end that are about one box."""

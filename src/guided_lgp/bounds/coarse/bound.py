@@ -4,11 +4,12 @@ import time
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
-from itertools import accumulate
+from functools import partial
+from itertools import accumulate, chain, islice
 
 import numpy as np
 
+from guided_lgp.bounds.checks import top_of
 from guided_lgp.bounds.coarse.decoding import Decoder
 from guided_lgp.bounds.coarse.facts import Facts
 from guided_lgp.bounds.coarse.formulation import Formulation
@@ -20,6 +21,7 @@ from guided_lgp.bounds.deadline import NEVER, Deadline
 from guided_lgp.bounds.goals import NO_TERMS, GoalTerms
 from guided_lgp.bounds.program.geometry import SceneGeometry
 from guided_lgp.bounds.results import Array, CoarseResult, Failure, Keyframe
+from guided_lgp.bounds.terms import balanced
 from guided_lgp.bounds.terms.term import UngraspableError
 from guided_lgp.bounds.verify import verify_keyframes
 from guided_lgp.logic import Skeleton, format_skeleton, successor
@@ -65,7 +67,8 @@ class CoarseBound:
             world: of this scene, if there is one already.
             goals: terms of which those of every moment always hold, and those of the end in
                 ``finish`` and ``solutions``.
-            firm: whether hands then hold their load steadily, where they can.
+            firm: whether hands then hold their load steadily, and what they put down stands
+                without what it carries, where there is room.
         """
         self.scene = scene
         self._restarts = restarts
@@ -75,8 +78,8 @@ class CoarseBound:
         self._geometry = SceneGeometry(scene)
         self.facts = facts or Facts(self._geometry)
         self._formulators = Formulators(self._geometry, goals)
-        self._firm = firm
-        self._steady = goals.held_steadily(scene.robot.description.grippers)
+        wishes = goals.firmer(scene.robot.description.grippers) if firm else ()
+        self._wished = tuple(Formulators(self._geometry, wish) for wish in wishes)
         self._starts = Starts(self._geometry, self._solver)
         self._decoder = Decoder(self._geometry)
         self._settings = Settings()
@@ -115,44 +118,73 @@ class CoarseBound:
         """The verdict on a skeleton at whose end the terms of the goals hold, from one without."""
         started = time.perf_counter()
         if result.feasible and self._goals.final:
-            programs = self._programs(result.skeleton, self._goals)
+            programs = self._programs(result.skeleton)
             found = self._first_feasible(programs, None, programs.variants.starts(self._restarts))
             result = replace(found, time_s=time.perf_counter() - started)
         return result
 
-    def _loads(self, skeleton: Skeleton) -> bool:
-        """Whether hands hold boxes that carry others, and shall do so steadily."""
-        states = accumulate(skeleton, successor, initial=self.scene.state)
-        return self._firm and any(s.standing_on(box) for s in states for box, _ in s.held)
+    def near(self, found: CoarseResult) -> Iterator[CoarseResult]:
+        """A solution, and of firm bounds a firmer one near it.
 
-    def steadier(self, found: CoarseResult) -> Iterator[CoarseResult]:
-        """Of firm bounds the solution near another one in which hands hold their load steadily."""
-        if not isinstance(found, CoarseSolution) or not self._loads(found.skeleton):
-            return
-        programs = self._programs(found.skeleton, self._steady)
-        formulation = programs.built(0, found.variant)
-        random = _Random(found.skeleton, 0)
-        start = self._starts.draw(formulation, random, noise=0.0, warm_start=found.values)
-        solution = self._solver.solve(formulation.program, start, self._settings)
-        steady = self._check(
-            programs, formulation, found.variant, solution, restarts=found.restarts, prefix=None
-        )
-        if steady.feasible:
-            yield steady
+        Where something stands only by what it carries, one in which nothing does comes first.
+        """
+        wished = self._wished_programs(found.skeleton)
+        if self.leans(found):
+            yield from islice(
+                chain(self._beside(found, wished[0]), self._from_starts(wished[0], 1)), 1
+            )
+        yield found
+        yield from islice(chain.from_iterable(self._beside(found, wish) for wish in wished), 1)
+
+    def leans(self, found: CoarseResult) -> bool:
+        """Whether firm bounds see something put down that stands there only by what it carries."""
+        if not self._wished_programs(found.skeleton):
+            return False
+        states = accumulate(found.skeleton, successor, initial=self.scene.state)
+        masses = {name: body.mass for name, body in self._geometry.bodies.items()}
+        for action, after, keyframe in zip(
+            found.skeleton, islice(states, 1, None), found.after_action, strict=True
+        ):
+            body = self._geometry.domain.bind(action).body
+            support = after.support_of(body)
+            if support is not None and after.standing_on(body):
+                boxes = {name: pose.tolist() for name, pose in keyframe.boxes.items()}
+                if balanced.leans(body, boxes, masses, top_of(self.scene, boxes, support)):
+                    return True
+        return False
 
     def solutions(self, skeleton: Skeleton, count: int) -> Iterator[CoarseResult]:
         """Up to ``count`` further verified solutions, with the goals, from independent starts.
 
-        Of firm bounds first as many in which hands hold their load steadily.
+        Of firm bounds first as many of the firmer ones.
         """
-        if self._loads(skeleton):
-            yield from self._from_starts(skeleton, self._steady, count)
-        yield from self._from_starts(skeleton, self._goals, count)
+        for programs in (*self._wished_programs(skeleton), self._programs(skeleton)):
+            yield from self._from_starts(programs, count)
 
-    def _from_starts(
-        self, skeleton: Skeleton, goals: GoalTerms, count: int
-    ) -> Iterator[CoarseResult]:
-        programs = self._programs(skeleton, goals)
+    def _wished_programs(self, skeleton: Skeleton) -> list[Programs]:
+        """Of firm bounds those with more than the goals, where hands hold boxes that carry others:
+        first with all that is wished.
+        """
+        states = accumulate(skeleton, successor, initial=self.scene.state)
+        if not any(state.standing_on(box) for state in states for box, _ in state.held):
+            return []
+        return [Programs(wish, self._geometry, skeleton, wish.goals) for wish in self._wished]
+
+    def _beside(self, found: CoarseResult, wish: Programs) -> Iterator[CoarseResult]:
+        """The solution nearest to another one that has what is wished, if it is good."""
+        if not isinstance(found, CoarseSolution):
+            return
+        formulation = wish.built(0, found.variant)
+        random = _Random(found.skeleton, 0)
+        start = self._starts.draw(formulation, random, noise=0.0, warm_start=found.values)
+        solution = self._solver.solve(formulation.program, start, self._settings)
+        firmer = self._check(
+            wish, formulation, found.variant, solution, restarts=found.restarts, prefix=None
+        )
+        if firmer.feasible:
+            yield firmer
+
+    def _from_starts(self, programs: Programs, count: int) -> Iterator[CoarseResult]:
         found = 0
         for number in range(self._restarts, self._restarts + 3 * count):
             try:
@@ -165,19 +197,13 @@ class CoarseBound:
             if found == count:
                 return
 
-    @cached_property
-    def _steady_formulators(self) -> Formulators:
-        """Only firm bounds need them."""
-        return Formulators(self._geometry, self._steady)
-
-    def _programs(self, skeleton: Skeleton, goals: GoalTerms) -> Programs:
-        steady = goals is self._steady
-        formulators = self._steady_formulators if steady else self._formulators
-        return Programs(formulators, self._geometry, skeleton, goals)
+    def _programs(self, skeleton: Skeleton) -> Programs:
+        """With all goals."""
+        return Programs(self._formulators, self._geometry, skeleton, self._goals)
 
     def _search(self, skeleton: Skeleton, prefix: CoarseSolution | None) -> CoarseSolution:
         """The verdict on a skeleton, whose prefix is feasible, without the goals' places."""
-        programs = self._programs(skeleton, self._early)
+        programs = Programs(self._formulators, self._geometry, skeleton, self._early)
         return self._first_feasible(programs, prefix, self._restarts)
 
     def _first_feasible(

@@ -1,5 +1,7 @@
 """The programs of a scene's skeletons: each goes on where that of its prefix ends."""
 
+from functools import cached_property
+
 from guided_lgp.bounds.coarse.formulation import Formulation, Formulator
 from guided_lgp.bounds.coarse.variants import Variant, Variants
 from guided_lgp.bounds.goals import GoalTerms
@@ -21,9 +23,16 @@ class Formulators:
     """Where the programs of the skeletons that were asked for last have come to."""
 
     def __init__(self, geometry: SceneGeometry, goals: GoalTerms) -> None:
-        self._begun = [Formulator(geometry, margins, goals.lasting) for margins in _MARGINS]
+        self.goals = goals
+        self._geometry = geometry
         self._kept: dict[tuple[int, Skeleton, Variant], Formulator] = {}
         """Those that were asked for last come last."""
+
+    @cached_property
+    def _begun(self) -> list[Formulator]:
+        """Made when first needed: few bounds need what users wish."""
+        lasting = self.goals.lasting
+        return [Formulator(self._geometry, margins, lasting) for margins in _MARGINS]
 
     def walked(self, margins: int, skeleton: Skeleton, variant: Variant) -> Formulator:
         """After a skeleton, with the margins of this number."""

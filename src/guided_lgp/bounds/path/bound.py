@@ -102,8 +102,7 @@ class PathBound:
         furthest = FurthestFailure()
         skeleton = coarse_result.skeleton
         others = self._coarse.solutions(skeleton, self._solutions)
-        steadier = self._coarse.steadier(coarse_result)
-        solutions = islice(chain([coarse_result], steadier, others), self._solutions)
+        solutions = islice(chain(self._coarse.near(coarse_result), others), self._solutions)
         motions = self._motions(skeleton, solutions, furthest, coarse_result)
         found = firmest(self._scene, motions) if self._firm else next(motions, None)
         if found is None:
@@ -111,8 +110,11 @@ class PathBound:
         return replace(found, time_s=time.perf_counter() - began)
 
     def others(self, skeleton: Skeleton, count: int) -> Iterator[PathResult]:
-        """Further motions, from up to so many further coarse solutions, whose grips hold firmly."""
-        solutions = self._coarse.solutions(skeleton, count)
+        """Further motions, from up to so many further coarse solutions, whose grips hold firmly
+        and in which nothing stands only by what it carries.
+        """
+        found = self._coarse.solutions(skeleton, count)
+        solutions = (solution for solution in found if not self._coarse.leans(solution))
         motions = self._motions(skeleton, solutions, FurthestFailure())
         return firm_ones(self._scene, motions) if self._firm else motions
 

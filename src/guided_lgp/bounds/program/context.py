@@ -97,6 +97,8 @@ class Context:
         """Boxes that stay level on their way, whatever they carry."""
         self.steady: frozenset[str] = frozenset()
         """Grippers whose load does not turn what they hold."""
+        self.unaided = False
+        """Whether what is put down would stand without what it carries."""
         self.aims: dict[tuple[int, str], Aim] = {}
         """Where goals want the boxes that actions put down for good, by action and box."""
         self.action = -1

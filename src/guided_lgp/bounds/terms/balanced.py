@@ -47,16 +47,20 @@ def inner(context: Context, support: str, height: float = 0.0) -> tuple[float, f
 def _add(context: Context, box: str, support: str) -> None:
     """Of the box with all that it carries, after the action, and of all that is below it."""
     stack = (box, *context.after.carried_by(box))[: max(SUMS.values())]  # verification judges all
-    key = (support, *((name, context.pose[name].plane) for name in stack))
-    if key not in context.balanced and any(context.pose[name].varies for name in stack):
-        context.balanced.add(key)
-        _rows(context, stack, support)
+    _rows(context, stack, support)
+    if context.unaided:
+        _rows(context, stack[:1], support)
     below = context.after.support_of(support)
     if below is not None:
         _add(context, support, below)
 
 
 def _rows(context: Context, stack: tuple[str, ...], support: str) -> None:
+    """Of a box with some that it carries, unless they are there or nothing can change them."""
+    key = (support, *((name, context.pose[name].plane) for name in stack))
+    if key in context.balanced or not any(context.pose[name].varies for name in stack):
+        return
+    context.balanced.add(key)
     kernel_name, most = next(sums for sums in SUMS.items() if sums[1] >= len(stack))
     masses = tuple(context.geometry.bodies[name].mass for name in stack)
     inputs = list(context.pose[support].plane)
@@ -108,6 +112,11 @@ def check(
     offset, axes = (x - top.pose[0], y - top.pose[1], 0.0), axes_of(top.pose)
     inset = max(BALANCE_INSET, LEVEL_ANGLE * (z - top.height)) if placed else 0.0
     return max(abs(dot(offset, axes[axis])) - top.half[axis] + inset for axis in (0, 1))
+
+
+def leans(box: str, boxes: Mapping[str, Pose], masses: Mapping[str, float], top: Top) -> bool:
+    """Whether a box that a plan puts down stands there only by what it carries; see ``check``."""
+    return check(box, boxes, masses, {}, top) > 0
 
 
 def whole_stack(box: str, support: Mapping[str, str]) -> list[str]:
