@@ -9,9 +9,11 @@ sys.path.insert(0, str(Path(__file__).parent / "bounds"))
 from motions import CLOSED, PR2, Motion, from_above, reach, scene, shifted
 
 from guided_lgp import plan
-from guided_lgp.clearance import clearance_of
+from guided_lgp.bounds.verify import verify_path
+from guided_lgp.clearance import clearance_of, verify_apart
 from guided_lgp.errors import InputError
 from guided_lgp.logic import parse_skeleton
+from guided_lgp.scene.world import world_of
 
 SCENE = scene(red=(0.52, 0.30, 0.65, 0.2, "tab1"), green=(0.52, -0.30, 0.65, 0.1, "tab2"))
 BOTH = parse_skeleton("(grasp pr2L red) (grasp pr2R green)")
@@ -53,3 +55,32 @@ def test_a_box_that_comes_back_to_its_table_is_near_it() -> None:
     found = clearance_of(SCENE, BOTH, motion.move("pr2L", low).trajectory())
     assert (found.part, found.body) == ("red", "tab1")
     assert found.distance == pytest.approx(0.004, abs=0.002)
+
+
+@pytest.mark.parametrize(("height", "refused"), [(0.0004, True), (0.004, False)])
+def test_what_comes_nearer_than_a_millimetre_is_refused_by_name(
+    height: float, refused: bool
+) -> None:
+    """Penetration is tolerated by verification up to 5 mm: plans of users keep a distance."""
+    motion = both_grasped(0.10)
+    tool = from_above(SCENE.boxes[0], "pr2L")
+    low = shifted(tool, y=0.06, z=height)
+    motion.move("pr2L", reach(SCENE, "pr2L", low, motion.q[PR2.arms["pr2L"].slice]))
+    trajectory = motion.trajectory()
+    assert verify_path(world_of(SCENE), BOTH, trajectory).violation is None
+    found = verify_apart(world_of(SCENE), BOTH, trajectory).violation
+    assert (found is not None) == refused
+    if found is not None:
+        assert found.constraint == "beside red tab1"
+        assert 0 < found.amount <= 0.001
+        assert found.action == 1
+
+
+def test_what_stands_nearer_at_the_start_may_be_lifted_off() -> None:
+    near = scene(red=(0.46, 0.30, 0.65, 0.0, "tab1"), green=(0.6104, 0.30, 0.65, 0.0, "tab1"))
+    red, green = near.boxes
+    assert 0 < abs(red.position[0] - green.position[0]) - red.size[0] < 0.001
+    found = plan(near, "(held red)")
+    assert found.solved
+    assert found.clearance is not None
+    assert found.clearance.distance < 0.001

@@ -1,13 +1,16 @@
 """How near a plan comes to what it does not touch."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
-from guided_lgp.bounds.collision import PADDING
+from guided_lgp.bounds.checks import Violation, body_names, overlap_name
+from guided_lgp.bounds.collision import LEAST, PADDING
+from guided_lgp.bounds.goals import NO_TERMS, GoalTerms
 from guided_lgp.bounds.results import Array, PathResult, Trajectory
+from guided_lgp.bounds.verify import PathReport, verify_path
 from guided_lgp.bounds.verify.attachments import switches_of
 from guided_lgp.bounds.verify.phase import STEP, Phase
 from guided_lgp.bounds.verify.touching import touches
@@ -25,6 +28,8 @@ FARTHEST = 0.1
 """m: nobody asks for more."""
 _SIGHT = 0.3
 """m up to which distances are measured: the farther off a body is, the longer it can be ignored."""
+_Pair = tuple[str, str]
+"""Two bodies."""
 _RESTING = 0.03
 """m of the hand's way up to which a box keeps no distance from what it stood on, or will stand on:
 as long as a straight way up."""
@@ -68,6 +73,37 @@ def clearance_of_path(scene: Scene, path: PathResult | None) -> Clearance | None
     return clearance_of(scene, path.skeleton, path.trajectory)
 
 
+def verify_apart(
+    world: World, skeleton: Skeleton, trajectory: Trajectory, goals: GoalTerms = NO_TERMS
+) -> PathReport:
+    """As ``verify_path``; and nothing comes nearer than ``LEAST`` to what it does not touch, unless
+    they are that near at the start.
+    """
+    report = verify_path(world, skeleton, trajectory, goals)
+    if report.violation is not None:
+        return report
+    near, ignored = _nearest(world, skeleton, trajectory, LEAST), set[_Pair]()
+    while near.part and _beside(world, near.part, near.body):
+        ignored |= {(near.part, near.body), (near.body, near.part)}
+        near = _nearest(world, skeleton, trajectory, LEAST, ignored)
+    if not near.part:
+        return report
+    switches = switches_of(world.scene, skeleton, trajectory)
+    assert isinstance(switches, list)
+    name = overlap_name(near.part, near.body, body_names(world.scene))
+    action = sum(trajectory.times[switch] < near.time for switch in switches)
+    action = min(int(action), len(skeleton) - 1)
+    return replace(report, violation=Violation(name, LEAST - near.distance, action, near.time))
+
+
+def _beside(world: World, part: str, body: str) -> bool:
+    """Whether two bodies are nearer than ``LEAST`` before anything moves, not one on the other."""
+    if {(part, body), (body, part)} & set(world.scene.state.support):
+        return False
+    world.set(world.scene.robot.start, initial_poses(world.scene))
+    return world.distance(part, body) < LEAST
+
+
 def clearance_of(scene: Scene, skeleton: Skeleton, trajectory: Trajectory) -> Clearance:
     """The smallest clearance of a plan.
 
@@ -80,10 +116,22 @@ def clearance_of(scene: Scene, skeleton: Skeleton, trajectory: Trajectory) -> Cl
         skeleton: the actions.
         trajectory: the motion, which has been verified.
     """
+    return _nearest(world_of(scene), skeleton, trajectory, FARTHEST)
+
+
+def _nearest(
+    world: World,
+    skeleton: Skeleton,
+    trajectory: Trajectory,
+    within: float,
+    ignored: Collection[_Pair] = (),
+) -> Clearance:
+    """The smallest clearance of a plan, if it is less than a distance (m); without some pairs."""
+    scene, nearest = world.scene, Clearance(within)
     rows = switches_of(scene, skeleton, trajectory)
     if not isinstance(rows, list):
         raise ValueError(f"the motion is not that of the actions: {rows.constraint}")
-    robot, world, nearest = scene.robot.description, world_of(scene), Clearance(FARTHEST)
+    robot = scene.robot.description
     q = trajectory.joints(robot.moving_joints)
     states = [scene.state]
     for action in skeleton:
@@ -96,13 +144,9 @@ def clearance_of(scene: Scene, skeleton: Skeleton, trajectory: Trajectory) -> Cl
         part = slice(first, last + 1)
         phase = Phase(scene, states[index], boxes, q[part], trajectory.times[part])
         touched = phase.touches(allowed, trajectory.times)
-        nearest = _nearest_of(world, phase, touched, rests, nearest)
+        nearest = _nearest_of(world, phase, touched, rests, nearest, ignored)
         boxes = phase.boxes_at(-1)
     return nearest
-
-
-_Pair = tuple[str, str]
-"""Two bodies."""
 
 
 @dataclass(frozen=True)
@@ -138,6 +182,7 @@ def _nearest_of(
     touched: list[set[tuple[str, str]]],
     rests: Sequence[_Rest],
     nearest: Clearance,
+    ignored: Collection[_Pair],
 ) -> Clearance:
     """The smallest clearance of a phase, if it is smaller than that of those before it."""
     robot = world.scene.robot.description
@@ -148,7 +193,8 @@ def _nearest_of(
         resting = {(r.box, r.body) for r in rests if r.start <= time <= r.end}
         apart = frozenset(touched[sample] | resting)
         if apart not in known:
-            known[apart] = list(_pairs(world, phase, touched[sample], resting))
+            pairs = _pairs(world, phase, touched[sample], resting)
+            known[apart] = [(mover, pair) for mover, pair in pairs if pair not in ignored]
         near = [(g, pair) for g, pair in known[apart] if due.get(pair, -1.0) < gone[g]]
         if not near:
             continue

@@ -8,9 +8,10 @@ from guided_lgp.bounds.coordination import Coordinator
 from guided_lgp.bounds.coordination.law import SMOOTH
 from guided_lgp.bounds.deadline import Deadline
 from guided_lgp.bounds.goals import GoalTerms
+from guided_lgp.bounds.path import Style
 from guided_lgp.bounds.results import CoarseResult, Failure, PathResult
 from guided_lgp.bounds.scene_bounds import SceneBounds
-from guided_lgp.clearance import CLEARANCE
+from guided_lgp.clearance import CLEARANCE, verify_apart
 from guided_lgp.logic import Action, Objective, Skeleton, State, format_skeleton, progress
 from guided_lgp.params import BoundsParams
 from guided_lgp.scene import Scene
@@ -81,9 +82,10 @@ def users_bounds(
     """
     firm = not any(box.grasps for box in scene.movable)
     goals = GoalTerms.of(objective, scene.symbols.domain)
-    coordinator = Coordinator(scene, deadline, goals, in_order, clearance)
+    coordinator = Coordinator(scene, deadline, goals, in_order, clearance, verify_apart)
     shorten = coordinator.shorten if coordinate else None
-    return SceneBounds(scene, params, deadline, objective, firm, shorten, SMOOTH, clearance)
+    style = Style(firm, shorten, SMOOTH, clearance, verify_apart)
+    return SceneBounds(scene, params, deadline, objective, style)
 
 
 class ObservedBounds:

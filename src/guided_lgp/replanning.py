@@ -25,10 +25,10 @@ from guided_lgp.bounds.execution.noise import misplaced
 from guided_lgp.bounds.path.assembly import stay
 from guided_lgp.bounds.plan_file import Plan
 from guided_lgp.bounds.results import PathResult, Trajectory
-from guided_lgp.bounds.scene_bounds import SceneBounds
 from guided_lgp.bounds.verify.attachments import switches_of
 from guided_lgp.clearance import CLEARANCE, Clearance, check_clearance, clearance_of_path
 from guided_lgp.errors import InputError
+from guided_lgp.explanation import users_bounds
 from guided_lgp.logic import (
     Goal,
     Objective,
@@ -145,7 +145,7 @@ def replan(
     goals, rest = course.objective, course.skeleton[after:]
     params = params or load_planning()
     deadline = Deadline.after(timeout)
-    bounds = partial(SceneBounds, scene, params.bounds, deadline, firm=True, clearance=clearance)
+    bounds = partial(users_bounds, scene, params.bounds, deadline, clearance=clearance)
     for way in islice(_ways(scene.state, rest, goals, scene.symbols), TRIED):
         for more in dict.fromkeys((in_the_middle(scene, way), ())):
             path = bounds((*goals, *more)).path(way) if way else stay(scene)

@@ -182,13 +182,28 @@ def test_arms_that_pass_each_other_between_rows_have_met(apart: tuple[Scene, Pat
     found = schedule(roads, moments)
     assert found is not None
     rows = Timetable(scene, roads, plan, found).rows
-    assert moments.met(found, rows) is None
+    assert moments.met(found, rows) == (PADDING, None)
     both = next(row for row, at in enumerate(found) if all(isinstance(on, Edge) for on, _ in at))
     for gripper, arm in PR2.arms.items():
         middle = reach(scene, gripper, IN_THE_MIDDLE, arm.home)
         for row, aside in ((both - 1, -0.1), (both, 0.1)):
             rows[row, arm.slice] = middle + aside * np.eye(len(middle))[0]
-    assert moments.met(found, rows) is found[both]
+    distance, met = moments.met(found, rows)
+    assert distance < 0
+    assert met is found[both]
+
+
+@pytest.mark.parametrize(("distance", "accepted"), [(0.0015, True), (0.0005, False)])
+def test_arms_pass_each_other_no_nearer_than_a_millimetre(
+    apart: tuple[Scene, PathResult],
+    monkeypatch: pytest.MonkeyPatch,
+    distance: float,
+    accepted: bool,
+) -> None:
+    """If nothing better is found, one moves at a time."""
+    scene, result = apart
+    monkeypatch.setattr(Moments, "met", lambda _, found, rows: (distance, found[len(found) // 2]))
+    assert (Coordinator(scene).shorten(result) is not result) == accepted
 
 
 @pytest.mark.parametrize(
@@ -249,12 +264,15 @@ def test_what_cannot_be_shortened_stays(apart: tuple[Scene, PathResult]) -> None
 
 
 def test_no_other_manner_is_tried_where_a_contact_is_refused(
-    apart: tuple[Scene, PathResult], monkeypatch: pytest.MonkeyPatch
+    apart: tuple[Scene, PathResult],
 ) -> None:
     scene, result = apart
     reports = iter([PathReport(Violation("balanced red green", 0.01, 1, 2.0))])
-    monkeypatch.setattr(coordinate, "verify_path", lambda *_: next(reports))
-    assert Coordinator(scene).shorten(result) is result
+
+    def once(*_: object) -> PathReport:
+        return next(reports)
+
+    assert Coordinator(scene, verify=once).shorten(result) is result
 
 
 @pytest.mark.parametrize("slower", [1.0, 3.0])

@@ -8,6 +8,7 @@ import pytest
 
 from guided_lgp.bounds.checks import box_bodies
 from guided_lgp.bounds.execution.forces import grips_of
+from guided_lgp.bounds.path import Style
 from guided_lgp.bounds.path.firm import firmest
 from guided_lgp.bounds.plan_file import write_plan
 from guided_lgp.bounds.results import CoarseResult, PathResult
@@ -28,7 +29,7 @@ LOADED = parse_skeleton(
 
 @cache
 def motion(firm: bool) -> PathResult:
-    return SceneBounds(SCENE, load_planning().bounds, firm=firm).path(LOADED)
+    return SceneBounds(SCENE, load_planning().bounds, style=Style(firm=firm)).path(LOADED)
 
 
 def load(found: PathResult) -> float:
@@ -85,7 +86,7 @@ def test_the_next_motion_is_taken_where_one_does_not_hold() -> None:
 
 def test_the_program_takes_the_box_nearer_to_what_it_will_carry() -> None:
     """The verdict on the sequence is the same; then red is held where green does not turn it."""
-    bound = SceneBounds(SCENE, load_planning().bounds, firm=True)
+    bound = SceneBounds(SCENE, load_planning().bounds, style=Style(firm=True))
     for length in range(1, len(LOADED) + 1):
         plain = bound.coarse(LOADED[:length])
     assert plain.feasible

@@ -7,11 +7,9 @@ from guided_lgp.bounds.coarse import CoarseBound
 from guided_lgp.bounds.coarse.facts import Facts
 from guided_lgp.bounds.coarse.pairs import Pairs
 from guided_lgp.bounds.coarse.parts import Boxes, Parts
-from guided_lgp.bounds.collision import PADDING
 from guided_lgp.bounds.deadline import NEVER, Deadline
 from guided_lgp.bounds.goals import GoalTerms
-from guided_lgp.bounds.path import PathBound, Shorten, check_motions
-from guided_lgp.bounds.path.assembly import FASTEST, Clock
+from guided_lgp.bounds.path import PAPER, PathBound, Style, check_motions
 from guided_lgp.bounds.results import CoarseResult, PathResult
 from guided_lgp.bounds.vocabulary import check_terms
 from guided_lgp.logic import Objective, Skeleton
@@ -38,27 +36,25 @@ class SceneBounds:
         params: BoundsParams,
         deadline: Deadline = NEVER,
         objective: Objective = (),
-        firm: bool = False,
-        shorten: Shorten | None = None,
-        clock: Clock = FASTEST,
-        clearance: float = PADDING,
+        style: Style = PAPER,
     ) -> None:
-        """Prepare a scene, for plans whose goals may say more than symbols.
+        """Prepare a scene.
 
-        ``firm`` ones take, of the motions of several coarse solutions, the first whose grips hold
-        what the hands carry: the paper asks for any motion, of one arm at a time, by the time law
-        ``clock``, where ``shorten`` makes no other of it. Motions keep a ``clearance`` (m) from
-        what they do not touch, where there is room.
+        Args:
+            scene: the initial configuration.
+            params: limits of both bounds.
+            deadline: after which there are no more verdicts.
+            objective: goals, which may say more than symbols.
+            style: how motions are made.
         """
         check_terms(scene.symbols.domain)
         check_motions(scene.symbols.domain)
         self.scene = scene
         self._goals = GoalTerms.of(objective, scene.symbols.domain)
         self._coarse_bound = CoarseBound(
-            scene, params.coarse_restarts, deadline=deadline, goals=self._goals, firm=firm
+            scene, params.coarse_restarts, deadline=deadline, goals=self._goals, firm=style.firm
         )
-        self._path_solutions, self._firm = params.path_solutions, firm
-        self._shorten, self._clock, self._clearance = shorten, clock, clearance
+        self._path_solutions, self._style = params.path_solutions, style
         self._deadline = deadline
         self._parts = Parts(scene, _PATIENCE * params.coarse_restarts, self.facts, deadline)
         self._pairs = Pairs(scene, self._coarse_bound.solve, self._parts.solve)
@@ -136,8 +132,5 @@ class SceneBounds:
             self._path_solutions,
             self._deadline,
             self._goals,
-            self._firm,
-            self._shorten,
-            self._clock,
-            self._clearance,
+            self._style,
         )

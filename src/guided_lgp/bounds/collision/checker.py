@@ -24,6 +24,8 @@ from guided_lgp.scene import Box, Scene
 
 PADDING = 0.003
 """Distance (m) that everything keeps from everything, declared contacts apart."""
+LEAST = 0.001
+"""Distance (m) below which a plan for users is refused, where things do not stand so near."""
 _ROUNDING = 0.0005
 """How much nearer (m) bodies may come that stand nearer than that at the start."""
 _FEW = 3

@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import cached_property
 from math import isnan
 
-from guided_lgp.bounds.collision import PADDING
+from guided_lgp.bounds.collision import LEAST, PADDING
 from guided_lgp.bounds.coordination.itinerary import Itinerary, itinerary
 from guided_lgp.bounds.coordination.moments import Moments
 from guided_lgp.bounds.coordination.roads import MANNERS, Manner, Road
@@ -18,7 +18,7 @@ from guided_lgp.bounds.path.bound import ITERATIONS
 from guided_lgp.bounds.path.motions import Mover
 from guided_lgp.bounds.path.situation import situation_at_start
 from guided_lgp.bounds.results import PathResult
-from guided_lgp.bounds.verify import Violation, verify_path
+from guided_lgp.bounds.verify import Verify, Violation, verify_path
 from guided_lgp.logic import Skeleton
 from guided_lgp.scene import Scene
 from guided_lgp.scene.world import world_of
@@ -39,6 +39,7 @@ class Coordinator:
         goals: GoalTerms = NO_TERMS,
         in_order: bool = False,
         clearance: float = PADDING,
+        verify: Verify = verify_path,
     ) -> None:
         """Prepare for one scene.
 
@@ -48,10 +49,11 @@ class Coordinator:
             goals: terms that the motion keeps.
             in_order: whether all actions take effect one after the other as they are given.
             clearance: see :class:`Mover`.
+            verify: judges motions.
         """
         self._scene = scene
         self._deadline, self._in_order, self._clearance = deadline, in_order, clearance
-        self._goals = goals
+        self._goals, self._verify = goals, verify
         self._start = situation_at_start(scene, goals.upright)
 
     @cached_property
@@ -87,8 +89,8 @@ class Coordinator:
     def _scheduled(
         self, skeleton: Skeleton, plan: Itinerary, manner: Manner
     ) -> PathResult | Violation | None:
-        """A verified motion by the ways of all arms, which are apart also between rows if a few
-        attempts find such a one; or what keeps every manner from having one.
+        """A verified motion by the ways of all arms, which are apart also between rows, and well
+        so if a few attempts find such a one; or what keeps every manner from having one.
         """
         busy = sum(len(stops) > 1 for stops in plan.stops.values())
         roads = {
@@ -111,10 +113,11 @@ class Coordinator:
                     break  # what is wrong is nothing that another moment would mend
                 moments.block(found[timetable.row_at(motion.time)])
                 continue
-            met = moments.met(found, timetable.rows)
+            distance, met = moments.met(found, timetable.rows)
             if met is None:
                 return motion
-            near = near or motion
+            if distance >= LEAST:
+                near = near or motion
             moments.block(met)
         return near
 
@@ -122,7 +125,7 @@ class Coordinator:
         """The motion of a schedule, or what is wrong with it."""
         actions = tuple(skeleton[number] for number, _ in timetable.switches)
         trajectory = timetable.trajectory(actions)
-        report = verify_path(world_of(self._scene), actions, trajectory, self._goals)
+        report = self._verify(world_of(self._scene), actions, trajectory, self._goals)
         if report.violation is not None:
             return report.violation
         return PathResult(

@@ -64,9 +64,9 @@ class Moments:
         order = np.concatenate([unknown[coarse], np.delete(unknown, coarse)])
         return self._judge(start, order, verdicts)
 
-    def met(self, moments: Sequence[Moment], rows: Array) -> Moment | None:
-        """The moment of a schedule, with its rows (T, joints), halfway to which two arms come
-        nearest to each other, if too near: they may pass each other between rows.
+    def met(self, moments: Sequence[Moment], rows: Array) -> tuple[float, Moment | None]:
+        """The smallest distance (m) of two arms halfway between the rows (T, joints) of a schedule,
+        where they may pass each other, and the moment before which it is; None if far enough.
         """
         halfway, nearest, met = (rows[1:] + rows[:-1]) / 2, PADDING, None
         by_scene: dict[tuple[frozenset[int], frozenset[int]], list[int]] = {}
@@ -78,7 +78,7 @@ class Moments:
             self._checker.enter(self._scene(*scene))
             nearest, row = self._checker.narrowest(halfway[numbers], nearest, between_arms=True)
             met = met if row is None else moments[1 + numbers[row]]
-        return met
+        return nearest, met
 
     def block(self, moment: Moment) -> None:
         """Never come near a moment again: what collides there passes the rows beside it, too."""

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import chain, islice
 
 from guided_lgp.bounds.coarse import CoarseBound
@@ -19,7 +19,7 @@ from guided_lgp.bounds.path.sampler import OutcomeSampler
 from guided_lgp.bounds.path.situation import Situation, Step
 from guided_lgp.bounds.path.task import FurthestFailure, Outcome, Stage, Task
 from guided_lgp.bounds.results import CoarseResult, Failure, PathResult
-from guided_lgp.bounds.verify import Violation, verify_path
+from guided_lgp.bounds.verify import Verify, Violation, verify_path
 from guided_lgp.logic import Skeleton
 from guided_lgp.scene import Scene
 from guided_lgp.scene.world import world_of
@@ -40,6 +40,26 @@ Shorten = Callable[[PathResult], PathResult]
 """Makes one motion of the steps of a result; returns that as it is where it finds none."""
 
 
+@dataclass(frozen=True)
+class Style:
+    """How motions are made."""
+
+    firm: bool = False
+    """Whether grips have to hold what the hands carry; counterweights are avoided then."""
+    shorten: Shorten | None = None
+    """Makes one motion of the steps, where it can; else one arm moves at a time ..."""
+    clock: Clock = FASTEST
+    """... by this time law."""
+    clearance: float = PADDING
+    """See :class:`Mover`."""
+    verify: Verify = verify_path
+    """Judges motions."""
+
+
+PAPER = Style()
+"""Any motion, of one arm at a time."""
+
+
 class PathBound:
     """Finds the motion for a skeleton, starting from its coarse solution.
 
@@ -55,10 +75,7 @@ class PathBound:
         solutions: int,
         deadline: Deadline = NEVER,
         goals: GoalTerms = NO_TERMS,
-        firm: bool = False,
-        shorten: Shorten | None = None,
-        clock: Clock = FASTEST,
-        clearance: float = PADDING,
+        style: Style = PAPER,
     ) -> None:
         """Prepare for one scene.
 
@@ -68,17 +85,14 @@ class PathBound:
             solutions: largest number of coarse solutions to try.
             deadline: after which it gives up.
             goals: terms that the motion keeps.
-            firm: whether grips have to hold what the hands carry.
-            shorten: makes one motion of the steps, where it can; else one arm moves at a time ...
-            clock: ... by this time law.
-            clearance: see :class:`Mover`.
+            style: how motions are made.
         """
         self._scene = scene
         self._coarse = coarse
         self._solutions = solutions
         self._goals = goals
-        self._firm, self._shorten, self._clock = firm, shorten, clock
-        self._mover = Mover(scene, ITERATIONS, deadline, clearance)
+        self._style = style
+        self._mover = Mover(scene, ITERATIONS, deadline, style.clearance)
         self._grips = {
             (gripper, box.name): grips_of(box, arm)
             for gripper, arm in self._mover.robot.arms.items()
@@ -104,7 +118,7 @@ class PathBound:
         others = self._coarse.solutions(skeleton, self._solutions)
         solutions = islice(chain(self._coarse.near(coarse_result), others), self._solutions)
         motions = self._motions(skeleton, solutions, furthest, coarse_result)
-        found = firmest(self._scene, motions) if self._firm else next(motions, None)
+        found = firmest(self._scene, motions) if self._style.firm else next(motions, None)
         if found is None:
             found = _failed(skeleton, furthest)
         return replace(found, time_s=time.perf_counter() - began)
@@ -116,7 +130,7 @@ class PathBound:
         found = self._coarse.solutions(skeleton, count)
         solutions = (solution for solution in found if not self._coarse.leans(solution))
         motions = self._motions(skeleton, solutions, FurthestFailure())
-        return firm_ones(self._scene, motions) if self._firm else motions
+        return firm_ones(self._scene, motions) if self._style.firm else motions
 
     def _motions(
         self,
@@ -142,7 +156,7 @@ class PathBound:
                 number,
                 self._goals,
                 self._coarse.overhung,
-                self._firm and solution is not plain,
+                self._style.firm and solution is not plain,
             )
             limit = self._mover.queries + _QUERIES * (len(skeleton) + 4)
             gathered = task.gathered()
@@ -187,8 +201,8 @@ class PathBound:
 
     def _motion(self, task: Task, found: PathResult) -> PathResult | Violation:
         """The verified motion of all steps: of all arms at once, or else optimised, or as it is."""
-        if self._shorten is not None:
-            shorter = self._shorten(found)
+        if self._style.shorten is not None:
+            shorter = self._style.shorten(found)
             if shorter.trajectory is not None:
                 return shorter
         with suppress(OutOfTimeError):
@@ -202,8 +216,8 @@ class PathBound:
     ) -> PathResult | Violation:
         """The verified motion of some steps one after the other, slower where motors are weak."""
         for pace in _PACES:
-            trajectory = assemble(self._mover.robot, task.start, steps, pace, self._clock)
-            report = verify_path(self._world, found.skeleton, trajectory, self._goals)
+            trajectory = assemble(self._mover.robot, task.start, steps, pace, self._style.clock)
+            report = self._style.verify(self._world, found.skeleton, trajectory, self._goals)
             if report.violation is None or not report.violation.constraint.startswith("effort "):
                 break
         if report.violation is not None:

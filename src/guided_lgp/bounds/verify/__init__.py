@@ -19,6 +19,13 @@ order) and ``joint names`` (not those of arms and fingers, each once).
 
 from guided_lgp.bounds.checks import Violation
 from guided_lgp.bounds.verify.keyframes import verify_keyframe, verify_keyframes
-from guided_lgp.bounds.verify.path import PathReport, verify_path
+from guided_lgp.bounds.verify.path import PathReport, Verify, verify_path
 
-__all__ = ["PathReport", "Violation", "verify_keyframe", "verify_keyframes", "verify_path"]
+__all__ = [
+    "PathReport",
+    "Verify",
+    "Violation",
+    "verify_keyframe",
+    "verify_keyframes",
+    "verify_path",
+]

@@ -1,6 +1,6 @@
 """Verification of paths."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import chain, pairwise
 
@@ -35,6 +35,10 @@ class PathReport:
     """How many were checked for collisions."""
     deepest_penetration: float = 0.0
     """m, outside the declared contacts."""
+
+
+Verify = Callable[[World, Skeleton, Trajectory, GoalTerms], PathReport]
+"""Checks a whole motion: :func:`verify_path`, or more than it."""
 
 
 def verify_path(
