@@ -184,11 +184,16 @@ def _nearest_of(
     nearest: Clearance,
     ignored: Collection[_Pair],
 ) -> Clearance:
-    """The smallest clearance of a phase, if it is smaller than that of those before it."""
+    """The smallest clearance of a phase, if it is smaller than that of those before it.
+
+    Only crowded samples can have one below ``LEAST``.
+    """
+    every = np.ones(len(phase.q), np.bool_)
+    samples = np.flatnonzero(phase.crowded() if nearest.distance <= LEAST else every)
     robot = world.scene.robot.description
     due, known = dict[_Pair, float](), dict[frozenset[_Pair], list[tuple[str, _Pair]]]()
     ways = _ways(robot, phase.q)
-    for sample, time in enumerate(phase.times.tolist()):
+    for sample, time in zip(samples.tolist(), phase.times[samples].tolist(), strict=True):
         gone = {mover: way[sample] for mover, way in ways.items()}
         resting = {(r.box, r.body) for r in rests if r.start <= time <= r.end}
         apart = frozenset(touched[sample] | resting)
@@ -199,7 +204,7 @@ def _nearest_of(
         if not near:
             continue
         fingers, boxes = robot.finger_values(phase.q[sample]), phase.boxes_at(sample)
-        if sample:  # at first, everything is near
+        if due:  # all have been put where they are
             boxes = {box: boxes[box] for box in phase.grips}
         world.set(phase.q[sample, : len(robot.joint_names)], boxes, fingers)
         for mover, (part, body) in near:

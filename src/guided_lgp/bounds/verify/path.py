@@ -7,7 +7,6 @@ from itertools import chain, pairwise
 import numpy as np
 
 from guided_lgp.bounds.checks import Violation, body_names, box_bodies, given_grasps, overlap_name
-from guided_lgp.bounds.collision import PlanningScene, checker_of
 from guided_lgp.bounds.goals import NO_TERMS, GoalTerms
 from guided_lgp.bounds.results import Array, Trajectory
 from guided_lgp.bounds.verify.attachments import switches_of
@@ -126,7 +125,6 @@ class _Collisions:
         self._world = world
         self._allowed, self._times = allowed, times
         self._robot = world.scene.robot.description
-        self._checker = checker_of(world.scene)
         self.checked = 0
         """Configurations so far."""
         self.deepest = 0.0
@@ -152,16 +150,9 @@ class _Collisions:
 
     def _judged(self, phase: Phase) -> list[int]:
         """The samples that PyBullet judges."""
-        robot, first = self._robot, phase.boxes_at(0)
-        standing = {box: pose for box, pose in first.items() if box not in phase.grips}
-        held = frozenset(frozenset(pair) for pair in phase.state.held)
-        grippers = robot.grippers
-        self._checker.enter(
-            PlanningScene(grippers[0], standing, phase.grips, held, frozenset(grippers[1:]))
-        )
-        judged = ~self._checker.free(phase.q)
+        judged = phase.crowded()
         judged[::JUDGED] = judged[-1] = True
-        fingers = phase.q[:, len(robot.joint_names) :]
+        fingers = phase.q[:, len(self._robot.joint_names) :]
         judged[1:] |= np.any(np.diff(fingers, axis=0), axis=1)
         return np.flatnonzero(judged).tolist()
 

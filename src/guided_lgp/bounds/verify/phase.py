@@ -4,8 +4,10 @@ from collections.abc import Collection, Iterable, Mapping
 from itertools import product
 
 import numpy as np
+from numpy.typing import NDArray
 
 from guided_lgp.bounds.checks import Violation, box_sizes
+from guided_lgp.bounds.collision import PlanningScene, checker_of
 from guided_lgp.bounds.results import Array
 from guided_lgp.bounds.terms.level import CARRY_ANGLE
 from guided_lgp.bounds.verify.touching import Touch
@@ -63,6 +65,17 @@ class Phase:
         boxes = {box: poses[sample] for box, poses in self._moving.items()}
         world.set(self.q[sample, : self._arms], boxes if sample else self.boxes_at(0), fingers)
         return world.penetrations(0.0, self.state.support)
+
+    def crowded(self) -> NDArray[np.bool_]:
+        """In which samples coal finds something nearer to something than its padding, the boxes in
+        hands apart.
+        """
+        first, *others = self._robot.grippers
+        standing = {box: pose for box, pose in self._start.items() if box not in self.grips}
+        held = frozenset(frozenset(pair) for pair in self.state.held)
+        checker = checker_of(self.scene)
+        checker.enter(PlanningScene(first, standing, self.grips, held, frozenset(others)))
+        return ~checker.free(self.q)
 
     def tools_at(self, sample: int) -> dict[str, Array]:
         """Pose (7,) of all tool frames."""
