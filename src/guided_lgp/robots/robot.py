@@ -226,6 +226,12 @@ class Robot:
         fingers = (joint for arm in self.arms.values() for joint in arm.fingers.joints)
         return (*self.joint_names, *fingers)
 
+    @cached_property
+    def moving_links(self) -> frozenset[str]:
+        """The links of all arms and hands."""
+        arms = self.arms.values()
+        return frozenset(link for arm in arms for link in (*arm.links, *arm.hand_links))
+
     def finger_values(self, moving: Array) -> dict[str, float]:
         """The value of each hand's fingers in a row (m,) of all moving joints, by gripper."""
         hands = {gripper: arm.fingers for gripper, arm in self.arms.items() if arm.fingers.joints}

@@ -301,11 +301,7 @@ class World:
             for link, index in self.links.items()
             if pybullet.getCollisionShapeData(self.robot, index, physicsClientId=self.client)
         ]
-        moving = {
-            link
-            for arm in self._description.arms.values()
-            for link in (*arm.links, *arm.hand_links)
-        }
+        moving = self._description.moving_links
         self.fixed_links = tuple(link for link in solid if link not in moving)
         disabled = self._description.disabled_pairs
         for one, other in combinations(solid, 2):

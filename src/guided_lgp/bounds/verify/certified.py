@@ -117,8 +117,7 @@ def _firm_parts(robot: Robot, gripper: str) -> tuple[str, ...]:
 def _pairs(robot: Robot, names: Sequence[str], boxes: Sequence[str]) -> Iterator[tuple[int, int]]:
     """Numbers of the bodies that PyBullet looks at, as :class:`World` has it: links come first."""
     parents, disabled = robot.description.parents, robot.disabled_pairs
-    links = {link for arm in robot.arms.values() for link in (*arm.links, *arm.hand_links)}
-    moving = {*links, *boxes}
+    moving = {*robot.moving_links, *boxes}
     for first, second in combinations(range(len(names)), 2):
         one, other = names[first], names[second]
         related = one == other or parents.get(one) == other or parents.get(other) == one
