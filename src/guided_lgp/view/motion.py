@@ -16,6 +16,8 @@ from guided_lgp.scene.world import initial_poses
 
 FRAME_RATE = 15.0
 """Frames per second."""
+DIGITS = 6
+"""To which times (s) and poses (m) are shown: further ones differ from processor to processor."""
 _STAND_S = 0.4
 """A hand that stands for so long has nothing to do; fingers close and arms turn back in less."""
 
@@ -72,13 +74,14 @@ def frames(scene: Scene, trajectory: Trajectory) -> list[Frame]:
                 grasp = grasps.setdefault(number, compose(inverse(tool), boxes[attachment.box]))
                 boxes[attachment.box] = compose(tool, grasp)
         joints = dict(zip(trajectory.joint_names, trajectory.q[index].tolist(), strict=True))
-        shown.append(Frame(float(trajectory.times[index]), joints, dict(boxes)))
+        shown.append(Frame(round(float(trajectory.times[index]), DIGITS), joints, dict(boxes)))
     return shown
 
 
 def _rows(trajectory: Trajectory) -> list[int]:
     """Indices into ``times``: one per frame, and every start and end of an attachment."""
-    _, regular = np.unique(np.floor(trajectory.times * FRAME_RATE), return_index=True)
+    numbers = np.floor(np.round(trajectory.times, DIGITS) * FRAME_RATE + 10.0**-DIGITS)
+    _, regular = np.unique(numbers, return_index=True)
     switches = [i for a in trajectory.attachments for i in (a.start, a.end)]
     return sorted({*regular.tolist(), *switches, len(trajectory.times) - 1})
 
@@ -149,4 +152,4 @@ def play(stage: Stage, shown: Sequence[Frame]) -> Iterator[float]:
     for frame, following in zip(shown, [*shown[1:], None], strict=True):
         show(stage, frame)
         if following is not None:
-            yield following.time - frame.time
+            yield round(following.time - frame.time, DIGITS)

@@ -11,6 +11,7 @@ import viser
 from guided_lgp.poses import Array
 from guided_lgp.scene.model import Scene
 from guided_lgp.view.bodies import Body, box_path, fixed_bodies, movable_bodies
+from guided_lgp.view.motion import DIGITS
 from guided_lgp.view.robot_shapes import RobotShapes
 
 FIELD_OF_VIEW = 0.75
@@ -114,7 +115,8 @@ class Viewer:
 
 def _pose(transform: Array) -> dict[str, Any]:
     """The arguments by which viser takes a pose (7,)."""
-    return {"position": transform[:3], "wxyz": transform[[6, 3, 4, 5]]}
+    rounded = np.round(transform, DIGITS) + 0.0  # not -0.0
+    return {"position": rounded[:3], "wxyz": rounded[[6, 3, 4, 5]]}
 
 
 def _move(node: Any, transform: Array) -> None:
