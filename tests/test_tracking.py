@@ -192,6 +192,14 @@ def test_the_data_that_a_stage_reads_are_inputs_of_both_runs(clone: Path) -> Non
         assert (data.dataset.name, data.dataset.digest) == ("data/x", "0123")
 
 
+def test_data_in_arrays_is_no_model(clone: Path) -> None:
+    outputs = {"data/rows/demonstrations.safetensors": "0123"}
+    run = runs_module._Run.start("demonstrate", PARAMS, "execution", replayed=True)
+    run.finish(StageFiles("demonstrate", "key", {}, outputs, {}))
+    (child,) = children()
+    assert child.info.status == "FINISHED"
+
+
 def test_the_machine_is_watched_while_a_stage_runs(
     clone: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -138,7 +138,8 @@ class _Run:
                 _log_metrics(self._client, self._parent, read_metrics(file))
             folder = file.parent.relative_to("reports")
             self._client.log_artifact(self._id, str(file), str(folder) if folder.name else None)
-        self._log_models([path for path in outputs if path.suffix == ".safetensors"])
+        weights = (path for path in outputs if path.suffix == ".safetensors")
+        self._log_models([path for path in weights if path.parts[0] == "models"])
         self._log_datasets(stage)
         self._end("FINISHED")
 
