@@ -47,13 +47,13 @@ class GoalTerms:
         }
 
     def firmer(self, grippers: Iterable[str]) -> tuple["GoalTerms", "GoalTerms"]:
-        """These with what plans for users wish, first with most: nothing stands only by what it
-        carries, and no load turns what grippers hold; then the latter alone.
+        """These with what plans for users wish: no load turns what grippers hold; and besides,
+        nothing stands only by what it carries.
         """
         steady = tuple(GroundTerm("steady", (gripper,)) for gripper in grippers)
-        wishes = (GroundTerm("unaided", ()), *steady), steady
-        unaided, held = (replace(self, lasting=(*self.lasting, *wish)) for wish in wishes)
-        return unaided, held
+        wishes = steady, (*steady, GroundTerm("unaided", ()))
+        held, unaided = (replace(self, lasting=(*self.lasting, *wish)) for wish in wishes)
+        return held, unaided
 
     def about(self, box: str) -> "GoalTerms":
         """Those at the end that are about one box."""

@@ -130,11 +130,11 @@ class CoarseBound:
         """
         wished = self._wished_programs(found.skeleton)
         if self.leans(found):
-            yield from islice(
-                chain(self._beside(found, wished[0]), self._from_starts(wished[0], 1)), 1
-            )
+            unaided = wished[-1]
+            yield from islice(chain(self._beside(found, unaided), self._from_starts(unaided, 1)), 1)
         yield found
-        yield from islice(chain.from_iterable(self._beside(found, wish) for wish in wished), 1)
+        firmer = chain.from_iterable(self._beside(found, wish) for wish in wished)
+        yield from islice((other for other in firmer if not self.leans(other)), 1)
 
     def leans(self, found: CoarseResult) -> bool:
         """Whether firm bounds see something put down that stands there only by what it carries."""
@@ -156,14 +156,22 @@ class CoarseBound:
     def solutions(self, skeleton: Skeleton, count: int) -> Iterator[CoarseResult]:
         """Up to ``count`` further verified solutions, with the goals, from independent starts.
 
-        Of firm bounds first as many of the firmer ones.
+        Of firm bounds first as many of the firmer ones; those in which something stands only by
+        what it carries, come after them.
         """
-        for programs in (*self._wished_programs(skeleton), self._programs(skeleton)):
-            yield from self._from_starts(programs, count)
+        leaning = []
+        for wish in self._wished_programs(skeleton):
+            for found in self._from_starts(wish, count):
+                if self.leans(found):
+                    leaning.append(found)
+                else:
+                    yield found
+        yield from leaning
+        yield from self._from_starts(self._programs(skeleton), count)
 
     def _wished_programs(self, skeleton: Skeleton) -> list[Programs]:
         """Of firm bounds those with more than the goals, where hands hold boxes that carry others:
-        first with all that is wished.
+        the last with all that is wished.
         """
         states = accumulate(skeleton, successor, initial=self.scene.state)
         if not any(state.standing_on(box) for state in states for box, _ in state.held):
