@@ -124,7 +124,7 @@ class CoarseBound:
         return result
 
     def near(self, found: CoarseResult) -> Iterator[CoarseResult]:
-        """A solution, and of firm bounds a firmer one near it.
+        """A solution; of firm bounds also a firmer one near it, and it again, for other grips.
 
         Where something stands only by what it carries, one in which nothing does comes first.
         """
@@ -135,6 +135,8 @@ class CoarseBound:
         yield found
         firmer = chain.from_iterable(self._beside(found, wish) for wish in wished)
         yield from islice((other for other in firmer if not self.leans(other)), 1)
+        if wished:
+            yield found
 
     def leans(self, found: CoarseResult) -> bool:
         """Whether firm bounds see something put down that stands there only by what it carries."""

@@ -156,7 +156,7 @@ class PathBound:
                 number,
                 self._goals,
                 self._coarse.overhung,
-                self._style.firm and solution is not plain,
+                self._style.firm and (number > 0 or solution is not plain),
             )
             limit = self._mover.queries + _QUERIES * (len(skeleton) + 4)
             gathered = task.gathered()
