@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from guided_lgp.bounds.checks import Violation, body_names, overlap_name
 from guided_lgp.bounds.collision import LEAST, PADDING
@@ -186,36 +187,45 @@ def _nearest_of(
 ) -> Clearance:
     """The smallest clearance of a phase, if it is smaller than that of those before it.
 
-    Only crowded samples can have one below ``LEAST``.
+    A pair is looked at again when its parts may have come nearer than that; below ``LEAST``, coal
+    says where and which.
     """
-    every = np.ones(len(phase.q), np.bool_)
-    samples = np.flatnonzero(phase.crowded() if nearest.distance <= LEAST else every)
+    near = phase.near() if nearest.distance <= LEAST else None
+    samples = range(len(phase.q)) if near is None else sorted(near)
     robot = world.scene.robot.description
-    due, known = dict[_Pair, float](), dict[frozenset[_Pair], list[tuple[str, _Pair]]]()
     ways = _ways(robot, phase.q)
-    for sample, time in zip(samples.tolist(), phase.times[samples].tolist(), strict=True):
-        gone = {mover: way[sample] for mover, way in ways.items()}
+    every = [found for found in _pairs(world, phase, set(), set()) if found[1] not in ignored]
+    numbers = {frozenset(pair): number for number, (_, pair) in enumerate(every)}
+    movers = np.array([list(ways).index(mover) for mover, _ in every], dtype=int)
+    gone, due = np.array(list(ways.values())), np.full(len(every), -1.0)
+    counted = dict[frozenset[_Pair], NDArray[np.bool_]]()
+    for sample in samples:
+        time = float(phase.times[sample])
         resting = {(r.box, r.body) for r in rests if r.start <= time <= r.end}
         apart = frozenset(touched[sample] | resting)
-        if apart not in known:
-            pairs = _pairs(world, phase, touched[sample], resting)
-            known[apart] = [(mover, pair) for mover, pair in pairs if pair not in ignored]
-        near = [(g, pair) for g, pair in known[apart] if due.get(pair, -1.0) < gone[g]]
-        if not near:
+        if apart not in counted:
+            left = {pair for _, pair in _pairs(world, phase, touched[sample], resting)}
+            counted[apart] = np.array([pair in left for _, pair in every], dtype=np.bool_)
+        looked_at = counted[apart] & (due < gone[movers, sample])
+        if near is not None:
+            those = [numbers[pair] for pair in near[sample] if pair in numbers]
+            looked_at[np.delete(np.arange(len(every)), those)] = False
+        if not looked_at.any():
             continue
         fingers, boxes = robot.finger_values(phase.q[sample]), phase.boxes_at(sample)
-        if due:  # all have been put where they are
+        if due.max() >= 0.0:  # all have been put where they are
             boxes = {box: boxes[box] for box in phase.grips}
         world.set(phase.q[sample, : len(robot.joint_names)], boxes, fingers)
-        for mover, (part, body) in near:
+        for number in np.flatnonzero(looked_at).tolist():
+            part, body = every[number][1]
             distance = world.distance(part, body, _SIGHT)
             if distance < nearest.distance:
                 nearest = Clearance(distance, part, body, time)
-            due[part, body] = gone[mover] + distance - nearest.distance
+            due[number] = gone[movers[number], sample] + distance - nearest.distance
     return nearest
 
 
-def _ways(robot: Robot, q: Array) -> dict[str, list[float]]:
+def _ways(robot: Robot, q: Array) -> dict[str, Array]:
     """How far (m) an arm and what it carries come nearer to what stands still, up to samples
     (T, m), at most; by gripper, and all arms together to each other.
     """
@@ -225,7 +235,7 @@ def _ways(robot: Robot, q: Array) -> dict[str, list[float]]:
         for gripper, arm in robot.arms.items()
     }
     moving[_ALL] = np.sum(list(moving.values()), axis=0)
-    return {mover: [0.0, *(STEP * np.cumsum(rows)).tolist()] for mover, rows in moving.items()}
+    return {mover: np.r_[0.0, STEP * np.cumsum(rows)] for mover, rows in moving.items()}
 
 
 def _pairs(

@@ -258,6 +258,22 @@ class CollisionChecker:
         free[[row for row, _ in self.collisions(moving)]] = False
         return free
 
+    def near(self, moving: Array) -> Iterator[tuple[int, frozenset[str]]]:
+        """Rows (m, joints) of all moving joints in which bodies are nearer than the padding, and
+        each pair of such bodies.
+        """
+        near = self._certificate.near(moving, self._apart, PADDING)
+        unsure = np.flatnonzero(near.any(axis=1))
+        for row, coordinates in zip(
+            unsure.tolist(), self._coordinates(moving[unsure]), strict=True
+        ):
+            pin.updateGeometryPlacements(
+                self._model, self._data, self._geometry, self._geometry_data, coordinates
+            )
+            for place in np.flatnonzero(near[row]).tolist():
+                if pin.computeCollision(self._geometry, self._geometry_data, self._active[place]):
+                    yield row, frozenset(self._named(self._active[place]))
+
     def distances(self, q: Array, fingers: Mapping[str, float], count: int) -> tuple[Array, Array]:
         """The smallest distances of pairs of bodies, to first order.
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from guided_lgp.bounds.checks import Violation, box_sizes
-from guided_lgp.bounds.collision import PlanningScene, checker_of
+from guided_lgp.bounds.collision import CollisionChecker, PlanningScene, checker_of
 from guided_lgp.bounds.results import Array
 from guided_lgp.bounds.terms.level import CARRY_ANGLE
 from guided_lgp.bounds.verify.touching import Touch
@@ -67,15 +67,26 @@ class Phase:
         return world.penetrations(0.0, self.state.support)
 
     def crowded(self) -> NDArray[np.bool_]:
-        """In which samples coal finds something nearer to something than its padding, the boxes in
-        hands apart.
+        """In which samples coal finds bodies nearer to each other than its padding, hands and what
+        they hold apart.
         """
+        return ~self._checker().free(self.q)
+
+    def near(self) -> dict[int, list[frozenset[str]]]:
+        """In crowded samples, the bodies that are so near to each other."""
+        found: dict[int, list[frozenset[str]]] = {}
+        for sample, pair in self._checker().near(self.q):
+            found.setdefault(sample, []).append(pair)
+        return found
+
+    def _checker(self) -> CollisionChecker:
+        """What is where in this mode, all arms moving."""
         first, *others = self._robot.grippers
         standing = {box: pose for box, pose in self._start.items() if box not in self.grips}
         held = frozenset(frozenset(pair) for pair in self.state.held)
         checker = checker_of(self.scene)
         checker.enter(PlanningScene(first, standing, self.grips, held, frozenset(others)))
-        return ~checker.free(self.q)
+        return checker
 
     def tools_at(self, sample: int) -> dict[str, Array]:
         """Pose (7,) of all tool frames."""
