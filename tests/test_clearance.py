@@ -3,6 +3,7 @@
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent / "bounds"))
@@ -10,10 +11,11 @@ from motions import CLOSED, PR2, Motion, from_above, reach, scene, shifted
 
 from guided_lgp import plan
 from guided_lgp.bounds.verify import verify_path
-from guided_lgp.clearance import clearance_of, verify_apart
+from guided_lgp.bounds.verify.phase import Phase
+from guided_lgp.clearance import _SLACK, _asked, clearance_of, verify_apart
 from guided_lgp.errors import InputError
 from guided_lgp.logic import parse_skeleton
-from guided_lgp.scene.world import world_of
+from guided_lgp.scene.world import initial_poses, world_of
 
 SCENE = scene(red=(0.52, 0.30, 0.65, 0.2, "tab1"), green=(0.52, -0.30, 0.65, 0.1, "tab2"))
 BOTH = parse_skeleton("(grasp pr2L red) (grasp pr2R green)")
@@ -84,3 +86,21 @@ def test_what_stands_nearer_at_the_start_may_be_lifted_off() -> None:
     assert found.solved
     assert found.clearance is not None
     assert found.clearance.distance < 0.001
+
+
+def test_nothing_is_nearer_than_the_smallest_clearance() -> None:
+    """Measured in PyBullet for all that should not touch; coal only says where to look first."""
+    trajectory = both_grasped(0.10).trajectory()
+    found, world = clearance_of(SCENE, BOTH, trajectory), world_of(SCENE)
+    q = trajectory.joints(PR2.moving_joints)
+    phase = Phase(SCENE, SCENE.state, initial_poses(SCENE), q[:40], trajectory.times[:40])
+    samples = np.arange(len(phase.q))
+    pairs, least = phase.gaps(samples)
+    asked = _asked(phase, samples, pairs, [set()] * len(samples), ())
+    assert asked.any(axis=0).sum() > 20
+    for sample in samples[::5].tolist():
+        phase.show(world, sample, everything=True)
+        for number in np.flatnonzero(asked[sample]).tolist():
+            distance = world.distance(*pairs[number], limit=5.0)
+            assert distance > least[sample, number] - _SLACK
+            assert distance > found.distance - 1e-9

@@ -1,8 +1,9 @@
 """How near a plan comes to what it does not touch."""
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import chain, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +14,10 @@ from guided_lgp.bounds.goals import NO_TERMS, GoalTerms
 from guided_lgp.bounds.results import Array, PathResult, Trajectory
 from guided_lgp.bounds.verify import PathReport, verify_path
 from guided_lgp.bounds.verify.attachments import switches_of
-from guided_lgp.bounds.verify.phase import STEP, Phase
+from guided_lgp.bounds.verify.phase import Phase
 from guided_lgp.bounds.verify.touching import touches
 from guided_lgp.errors import InputError
 from guided_lgp.logic import Skeleton, State, successor
-from guided_lgp.robots import Robot
 from guided_lgp.scene import Scene
 from guided_lgp.scene.world import World, initial_poses, world_of
 
@@ -27,17 +27,13 @@ WIDEST = 0.05
 """Largest clearance (m) that may be wished: boxes are seldom farther apart."""
 FARTHEST = 0.1
 """m: nobody asks for more."""
-_SIGHT = 0.3
-"""m up to which distances are measured: the farther off a body is, the longer it can be ignored."""
+_SLACK = 0.004
+"""m by which PyBullet may find bodies nearer to each other than coal: its hulls are wider."""
 _Pair = tuple[str, str]
 """Two bodies."""
 _RESTING = 0.03
 """m of the hand's way up to which a box keeps no distance from what it stood on, or will stand on:
 as long as a straight way up."""
-
-
-_ALL = "all"
-"""Instead of a gripper: what one arm carries and another arm move both."""
 
 
 @dataclass(frozen=True)
@@ -187,71 +183,62 @@ def _nearest_of(
 ) -> Clearance:
     """The smallest clearance of a phase, if it is smaller than that of those before it.
 
-    A pair is looked at again when its parts may have come nearer than that; below ``LEAST``, coal
-    says where and which.
+    By what coal knows of the distances, PyBullet measures what may be as near, the nearest first;
+    below ``LEAST``, only where it is crowded.
     """
-    near = phase.near() if nearest.distance <= LEAST else None
-    samples = range(len(phase.q)) if near is None else sorted(near)
-    robot = world.scene.robot.description
-    ways = _ways(robot, phase.q)
-    every = [found for found in _pairs(world, phase, set(), set()) if found[1] not in ignored]
-    numbers = {frozenset(pair): number for number, (_, pair) in enumerate(every)}
-    movers = np.array([list(ways).index(mover) for mover, _ in every], dtype=int)
-    gone, due = np.array(list(ways.values())), np.full(len(every), -1.0)
-    counted = dict[frozenset[_Pair], NDArray[np.bool_]]()
-    for sample in samples:
-        time = float(phase.times[sample])
-        resting = {(r.box, r.body) for r in rests if r.start <= time <= r.end}
-        apart = frozenset(touched[sample] | resting)
-        if apart not in counted:
-            left = {pair for _, pair in _pairs(world, phase, touched[sample], resting)}
-            counted[apart] = np.array([pair in left for _, pair in every], dtype=np.bool_)
-        looked_at = counted[apart] & (due < gone[movers, sample])
-        if near is not None:
-            those = [numbers[pair] for pair in near[sample] if pair in numbers]
-            looked_at[np.delete(np.arange(len(every)), those)] = False
-        if not looked_at.any():
-            continue
-        fingers, boxes = robot.finger_values(phase.q[sample]), phase.boxes_at(sample)
-        if due.max() >= 0.0:  # all have been put where they are
-            boxes = {box: boxes[box] for box in phase.grips}
-        world.set(phase.q[sample, : len(robot.joint_names)], boxes, fingers)
-        for number in np.flatnonzero(looked_at).tolist():
-            part, body = every[number][1]
-            distance = world.distance(part, body, _SIGHT)
-            if distance < nearest.distance:
-                nearest = Clearance(distance, part, body, time)
-            due[number] = gone[movers[number], sample] + distance - nearest.distance
+    every = np.ones(len(phase.q), np.bool_)
+    samples = np.flatnonzero(phase.crowded() if nearest.distance <= LEAST else every)
+    named, least = phase.gaps(samples)
+    close = np.flatnonzero((least < nearest.distance + _SLACK).any(axis=0))
+    pairs, least = [_moving_first(phase, named[column]) for column in close], least[:, close]
+    asked = _asked(phase, samples, pairs, touched, rests)
+    asked[:, [pair in ignored for pair in pairs]] = False
+    rows, columns = np.nonzero(asked & (least < nearest.distance + _SLACK))
+    least, shown = least[rows, columns], -1
+    for number in np.argsort(least, kind="stable").tolist():
+        if least[number] >= nearest.distance + _SLACK:
+            break
+        sample, (part, body) = int(samples[rows[number]]), pairs[columns[number]]
+        if sample != shown:
+            phase.show(world, sample, everything=shown < 0)
+            shown = sample
+        distance = world.distance(part, body, FARTHEST)
+        if distance < nearest.distance:
+            nearest = Clearance(distance, part, body, float(phase.times[sample]))
     return nearest
 
 
-def _ways(robot: Robot, q: Array) -> dict[str, Array]:
-    """How far (m) an arm and what it carries come nearer to what stands still, up to samples
-    (T, m), at most; by gripper, and all arms together to each other.
-    """
-    changes = np.diff(q, axis=0) != 0.0
-    moving = {
-        gripper: changes[:, np.r_[arm.slice, arm.fingers.slice]].any(axis=1)
-        for gripper, arm in robot.arms.items()
-    }
-    moving[_ALL] = np.sum(list(moving.values()), axis=0)
-    return {mover: np.r_[0.0, STEP * np.cumsum(rows)] for mover, rows in moving.items()}
+def _moving_first(phase: Phase, pair: _Pair) -> _Pair:
+    """A link or a box in a hand, and what it may meet."""
+    first, second = pair
+    moves = second in phase.grips and first not in phase.scene.robot.description.moving_links
+    return (second, first) if moves else pair
 
 
-def _pairs(
-    world: World, phase: Phase, touched: set[_Pair], resting: set[_Pair]
-) -> Iterator[tuple[str, _Pair]]:
-    """Moving parts, and bodies that they do not touch; with the gripper whose arm moves them."""
-    scene, robot = world.scene, world.scene.robot.description
-    bodies = [body.name for body in scene.bodies]
-    holders = {box: holder for box, (holder, _) in phase.grips.items()}
+def _asked(
+    phase: Phase,
+    samples: NDArray[np.intp],
+    pairs: Sequence[_Pair],
+    touched: Sequence[set[_Pair]],
+    rests: Iterable[_Rest],
+) -> NDArray[np.bool_]:
+    """In which samples (m, p) which pairs should not touch: of a moving part and a body."""
+    robot, bodies = phase.scene.robot.description, body_names(phase.scene)
+    asked = np.zeros((len(samples), len(pairs)), np.bool_)
+    columns = defaultdict[_Pair, list[int]](list)
+    for column, (part, body) in enumerate(pairs):
+        columns[part, body].append(column)
+        carried = part in phase.grips and body not in phase.grips
+        asked[:, column] = body in bodies and (carried or part in robot.moving_links)
     for gripper, arm in robot.arms.items():
-        own = {box for box, holder in holders.items() if holder == gripper}
-        handled = own | {box for box, holder in touched if holder == gripper}
-        for body in bodies:
-            links = arm.links if body in handled else (*arm.links, *arm.hand_links)
-            mover = gripper if holders.get(body, gripper) == gripper else _ALL
-            yield from ((mover, (link, body)) for link in links)
-    for box, gripper in holders.items():
-        others = (body for body in bodies if body not in holders)
-        yield from ((gripper, (box, body)) for body in others if (box, body) not in resting)
+        for box in phase.scene.symbols.boxes:
+            own = phase.grips.get(box, ("", None))[0] == gripper
+            at_it = np.array([own or (box, gripper) in touched[sample] for sample in samples])
+            for column in chain.from_iterable(columns[link, box] for link in arm.hand_links):
+                asked[at_it.astype(bool), column] = False
+    for rest in rests:
+        times = phase.times[samples]
+        during = (times >= rest.start) & (times <= rest.end)
+        for column in columns[rest.box, rest.body]:
+            asked[during, column] = False
+    return asked

@@ -258,21 +258,12 @@ class CollisionChecker:
         free[[row for row, _ in self.collisions(moving)]] = False
         return free
 
-    def near(self, moving: Array) -> Iterator[tuple[int, frozenset[str]]]:
-        """Rows (m, joints) of all moving joints in which bodies are nearer than the padding, and
-        each pair of such bodies.
+    def gaps(self, moving: Array) -> tuple[list[tuple[str, str]], NDArray[np.float32]]:
+        """The pairs (p) that are checked, by the names of their bodies, and what their distances
+        (m, p) are at least (m) in rows (m, joints) of all moving joints.
         """
-        near = self._certificate.near(moving, self._apart, PADDING)
-        unsure = np.flatnonzero(near.any(axis=1))
-        for row, coordinates in zip(
-            unsure.tolist(), self._coordinates(moving[unsure]), strict=True
-        ):
-            pin.updateGeometryPlacements(
-                self._model, self._data, self._geometry, self._geometry_data, coordinates
-            )
-            for place in np.flatnonzero(near[row]).tolist():
-                if pin.computeCollision(self._geometry, self._geometry_data, self._active[place]):
-                    yield row, frozenset(self._named(self._active[place]))
+        pairs = [self._named(pair) for pair in self._active]
+        return pairs, self._certificate.gaps(moving, self._apart)
 
     def distances(self, q: Array, fingers: Mapping[str, float], count: int) -> tuple[Array, Array]:
         """The smallest distances of pairs of bodies, to first order.

@@ -56,14 +56,19 @@ class Phase:
         """Pose (7,) of every box."""
         return self._start | {box: poses[sample] for box, poses in self._moving.items()}
 
+    def show(self, world: World, sample: int, everything: bool) -> None:
+        """Put arms and boxes where they are at a sample; only those that move, or everything."""
+        fingers = self._robot.finger_values(self.q[sample])
+        moved = {box: poses[sample] for box, poses in self._moving.items()}
+        boxes = self.boxes_at(sample) if everything else moved
+        world.set(self.q[sample, : self._arms], boxes, fingers)
+
     def overlaps(self, world: World, sample: int) -> list[Penetration]:
         """What the world finds at a sample, whatever its depth, deepest first.
 
         Bodies and what they stand on may touch, so that they are not measured.
         """
-        fingers = self._robot.finger_values(self.q[sample])
-        boxes = {box: poses[sample] for box, poses in self._moving.items()}
-        world.set(self.q[sample, : self._arms], boxes if sample else self.boxes_at(0), fingers)
+        self.show(world, sample, everything=sample == 0)
         return world.penetrations(0.0, self.state.support)
 
     def crowded(self) -> NDArray[np.bool_]:
@@ -72,12 +77,11 @@ class Phase:
         """
         return ~self._checker().free(self.q)
 
-    def near(self) -> dict[int, list[frozenset[str]]]:
-        """In crowded samples, the bodies that are so near to each other."""
-        found: dict[int, list[frozenset[str]]] = {}
-        for sample, pair in self._checker().near(self.q):
-            found.setdefault(sample, []).append(pair)
-        return found
+    def gaps(self, samples: NDArray[np.intp]) -> tuple[list[tuple[str, str]], NDArray[np.float32]]:
+        """Pairs (p) of bodies of which one moves, but hands and what they hold, and what their
+        distances (m, p) are at least (m) at samples (m,).
+        """
+        return self._checker().gaps(self.q[samples])
 
     def _checker(self) -> CollisionChecker:
         """What is where in this mode, all arms moving."""
