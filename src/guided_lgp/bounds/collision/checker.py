@@ -249,8 +249,7 @@ class CollisionChecker:
 
     def certified(self, moving: Array) -> NDArray[np.bool_]:
         """Which rows (m, joints) of all moving joints are surely free; see :class:`Certificate`."""
-        near = self._certificate.near(moving, self._apart, PADDING)
-        return np.asarray(~near.any(axis=1))
+        return np.asarray(~self._certificate.near(moving, self._apart, PADDING).any(axis=1))
 
     def free(self, moving: Array) -> NDArray[np.bool_]:
         """Which rows (m, joints) of all moving joints are free."""
@@ -259,11 +258,8 @@ class CollisionChecker:
         return free
 
     def gaps(self, moving: Array) -> tuple[list[tuple[str, str]], NDArray[np.float32]]:
-        """The pairs (p) that are checked, by the names of their bodies, and what their distances
-        (m, p) are at least (m) in rows (m, joints) of all moving joints.
-        """
-        pairs = [self._named(pair) for pair in self._active]
-        return pairs, self._certificate.gaps(moving, self._apart)
+        """Pairs (p) of bodies, and their distances (m, p) at least (m), by rows (m, joints)."""
+        return list(map(self._named, self._active)), self._certificate.gaps(moving, self._apart)
 
     def distances(self, q: Array, fingers: Mapping[str, float], count: int) -> tuple[Array, Array]:
         """The smallest distances of pairs of bodies, to first order.
