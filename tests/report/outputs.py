@@ -82,6 +82,7 @@ def geometry() -> dict[str, dict[str, float]]:
             "path_verified_share": 0.97,
             "path_median_s": 0.2 * length,
             "physics_success_share": 0.98,
+            "physics_n": 30,
             "n": 100,
         }
         for length in (2, 4, 6, 8, 10)

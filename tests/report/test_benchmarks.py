@@ -96,7 +96,7 @@ def test_every_part_has_a_table_and_ratios_come_from_one_run() -> None:
                 "feasible_found": 490,
             },
             "coarse_bound": {"4": coarse | {"ipopt": ipopt}},
-            "path_bound": {"4": motion | {"physics_success_share": 0.98}},
+            "path_bound": {"4": motion | {"physics_success_share": 0.98, "physics_n": 30}},
             "enumeration": {"1": 80.0, "2": 150.0},
             "planners": {"c.1": planners},
             "training": {"instruction": 123_456.0},

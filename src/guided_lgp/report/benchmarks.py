@@ -246,13 +246,22 @@ def _path(metrics: Metrics) -> Table:
             number(row["path_max_s"], 1),
             percent(row["physics_success_share"]),
             str(row["n"]),
+            str(row["physics_n"]),
         )
         for length, row in metrics.items()
     )
     return Table(
         "path_bound",
         "Path bound with its verification",
-        ("K", "verified path", "median (s)", "longest (s)", "goals hold after execution", "n"),
+        (
+            "K",
+            "verified path",
+            "median (s)",
+            "longest (s)",
+            "goals hold after execution",
+            "n",
+            "executed",
+        ),
         rows,
         ("Random coarse-feasible sequences of setup a; one core each.",),
     )

@@ -303,6 +303,7 @@ def geometry(metrics: Metrics) -> Table:
         "path_median_s": ("Path bound with its verification, median (s)", lambda v: number(v, 2)),
         "physics_success_share": ("Goals hold after physics execution", percent),
         "n": ("Sequences n", lambda v: number(v, 0)),
+        "physics_n": ("Of these executed", lambda v: number(v, 0)),
     }
     rows = [
         (label, *(text(metrics[length].get(key)) for length in lengths))
