@@ -1,9 +1,8 @@
 """How near a plan comes to what it does not touch."""
 
-from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain, pairwise
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -186,8 +185,9 @@ def _nearest_of(
     By what coal knows of the distances, PyBullet measures what may be as near, the nearest first;
     below ``LEAST``, only where it is crowded.
     """
-    every = np.ones(len(phase.q), np.bool_)
-    samples = np.flatnonzero(phase.crowded() if nearest.distance <= LEAST else every)
+    samples = np.arange(len(phase.q))
+    if nearest.distance <= LEAST:
+        samples = samples[phase.crowded()]
     named, least = phase.gaps(samples)
     close = np.flatnonzero((least < nearest.distance + _SLACK).any(axis=0))
     pairs, least = [_moving_first(phase, named[column]) for column in close], least[:, close]
@@ -223,22 +223,18 @@ def _asked(
     rests: Iterable[_Rest],
 ) -> NDArray[np.bool_]:
     """In which samples (m, p) which pairs should not touch: of a moving part and a body."""
-    robot, bodies = phase.scene.robot.description, body_names(phase.scene)
+    robot, bodies, times = phase.scene.robot.description, body_names(phase.scene), phase.times
+    hand_of = {link: g for g, arm in robot.arms.items() for link in arm.hand_links}
     asked = np.zeros((len(samples), len(pairs)), np.bool_)
-    columns = defaultdict[_Pair, list[int]](list)
     for column, (part, body) in enumerate(pairs):
-        columns[part, body].append(column)
         carried = part in phase.grips and body not in phase.grips
-        asked[:, column] = body in bodies and (carried or part in robot.moving_links)
-    for gripper, arm in robot.arms.items():
-        for box in phase.scene.symbols.boxes:
-            own = phase.grips.get(box, ("", None))[0] == gripper
-            at_it = np.array([own or (box, gripper) in touched[sample] for sample in samples])
-            for column in chain.from_iterable(columns[link, box] for link in arm.hand_links):
-                asked[at_it.astype(bool), column] = False
-    for rest in rests:
-        times = phase.times[samples]
-        during = (times >= rest.start) & (times <= rest.end)
-        for column in columns[rest.box, rest.body]:
-            asked[during, column] = False
+        if body not in bodies or not (carried or part in robot.moving_links):
+            continue
+        hand, (holder, _) = hand_of.get(part), phase.grips.get(body, (None, None))
+        if hand is None or hand != holder:
+            asked[:, column] = [(body, hand) not in touched[sample] for sample in samples]
+        for rest in rests:
+            if (rest.box, rest.body) == (part, body):
+                during = (times >= rest.start) & (times <= rest.end)
+                asked[during[samples], column] = False
     return asked
